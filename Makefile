@@ -1,0 +1,69 @@
+# Detent. On a fresh machine with Python 3.11 or later, make and git:
+#   make run       the main job: the drilling cell of the GS-C200 datasheet, run and drawn
+#   make test      every check that a change must pass (a few minutes)
+#   make test-all  the slow tests too
+#   make bench     the benchmarks, each with its baseline measured in the same run
+
+SHELL := /bin/bash
+UV := $(shell command -v uv || echo .uv/bin/uv)
+PYTHON := .venv/bin/python
+STAMP := .venv/.installed
+SYSTEM_PACKAGES := sigrok-cli
+
+.PHONY: setup system run test test-all check bench lock docs clean
+
+setup: $(STAMP)
+
+run: $(STAMP)
+	@.venv/bin/detent demo
+
+test: check system
+	$(PYTHON) -m pytest -n 2 --dist loadgroup -m "not slow" -rs
+
+test-all: check system
+	$(PYTHON) -m pytest -n 2 --dist loadgroup -rs
+
+check: $(STAMP)
+	.venv/bin/ruff check
+	.venv/bin/ruff format --check
+	.venv/bin/lint-imports
+	.venv/bin/mypy
+
+bench: $(STAMP)
+	$(PYTHON) -m bench
+
+# What the reference pages take from the tables.
+docs: $(STAMP)
+	$(PYTHON) docs/generate.py
+
+lock: $(UV)
+	$(UV) pip compile --universal --generate-hashes --all-extras --python-version 3.11 --no-header --quiet \
+	    pyproject.toml -o requirements.lock
+
+$(STAMP): requirements.lock pyproject.toml | $(UV)
+	@echo "Setting up .venv ..."
+	@$(UV) venv --quiet --allow-existing --python '>=3.11' .venv
+	@$(UV) pip sync --quiet --python $(PYTHON) --require-hashes requirements.lock
+	@$(UV) pip install --quiet --python $(PYTHON) --no-deps --no-build-isolation --editable .
+	@touch $(STAMP)
+
+.uv/bin/uv:
+	@echo "Fetching uv ..."
+	@python3 -m venv .uv
+	@.uv/bin/pip install --quiet --disable-pip-version-check uv
+
+# Programs that some tests use as a witness; a test that misses its program says so and is skipped.
+system:
+	@for package in $(SYSTEM_PACKAGES); do \
+	    command -v $$package > /dev/null && continue; \
+	    if [ "$$(id -u)" = 0 ] && command -v apt-get > /dev/null; then \
+	        echo "Installing $$package ..."; \
+	        { apt-get install -qq -y $$package || { apt-get update -qq && apt-get install -qq -y $$package; }; } \
+	            > /dev/null 2>&1 || echo "could not install $$package: its tests are skipped"; \
+	    else \
+	        echo "$$package is not installed: its tests are skipped"; \
+	    fi; \
+	done
+
+clean:
+	rm -rf .venv .uv detent-demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

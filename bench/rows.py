@@ -1,0 +1,38 @@
+"""What a benchmark reports: a number, beside a baseline measured in the same run."""
+
+from collections.abc import Callable, Sequence
+from statistics import median
+from time import perf_counter
+from typing import NamedTuple
+
+
+class Row(NamedTuple):
+    """One measured number; `target` is the least (or, for times, the most) that will do, None for a mere fact."""
+
+    name: str
+    value: float
+    unit: str
+    baseline_name: str
+    baseline_value: float
+    target: float | None
+
+
+def measure(fn: Callable[[], object], repeat: int = 5) -> float:
+    """The median of `repeat` runs of `fn` in seconds, after one that does not count."""
+    fn()
+    times = []
+    for _ in range(repeat):
+        begin = perf_counter()
+        fn()
+        times.append(perf_counter() - begin)
+    return median(times)
+
+
+def print_table(rows: Sequence[Row]) -> None:
+    """Print the rows, aligned, each with its ratio to the baseline and its target."""
+    print(f"{'':48} {'value':>12} {'unit':10} {'ratio':>8}  {'baseline':36} {'target':>9}")
+    for row in rows:
+        ratio = row.value / row.baseline_value if row.baseline_value else float("nan")
+        target = "" if row.target is None else f"{row.target:9.4g}"
+        baseline = f"{row.baseline_name} {row.baseline_value:.4g}"
+        print(f"{row.name:48} {row.value:12.4g} {row.unit:10} {ratio:8.3f}  {baseline:36} {target:>9}")

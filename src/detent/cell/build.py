@@ -1,0 +1,361 @@
+"""From a description to a cell that runs: models made, wires joined into nets, programs loaded, power on.
+
+Whatever cannot be built is a `Problem` with the key and the remedy, and nothing is built.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from detent.assembler import AssemblyFailed, ImageError, assemble
+from detent.cell.cell import Action, Cell, Store, Wiring, no_store
+from detent.cell.description import Description, Problem, ScriptEntry, Unit
+from detent.cell.parts import PARTS, Part
+from detent.cell.switches import AxisSwitch, Switch
+from detent.controllers import catalogue
+from detent.controllers.catalogue import CatalogueError, Model
+from detent.controllers.device import Controller, Device
+from detent.lines.line import Line
+from detent.pins import HIGH, Level, Net, Pin, PinKind
+
+Read = Callable[[str], str]
+"""The text of a file that the cell names (relative to the cell's own place). Raises OSError."""
+
+
+def build(
+    description: Description,
+    read: Read,
+    *,
+    images: Mapping[str, bytes] | None = None,
+    store: Store = no_store,
+    record: bool = True,
+    line_timing: bool = True,
+) -> Cell:
+    """The cell, switched on at time 0, with its programs started.
+
+    `images` are the units' non-volatile memories as they were kept, `store` keeps them. Raises Problem.
+    """
+    return _Builder(description, read).cell(images or {}, store, record, line_timing)
+
+
+class _End(NamedTuple):
+    """A pin of a part, and how it is written in the file."""
+
+    part: int
+    pin: Pin
+    text: str
+
+
+class _Builder:
+    def __init__(self, description: Description, read: Read) -> None:
+        self.description, self.read = description, read
+        self.models: dict[str, Model | Part] = {}
+        self.names: list[str] = []
+        self.parts: list[Device] = []
+        self.net_of: dict[tuple[int, str], int] = {}
+        self.nets: list[list[_End]] = []
+        self.axes: dict[int, int] = {}  # switch -> the unit whose axis it follows
+
+    def problem(self, key: str, message: str) -> Problem:
+        return Problem(self.description.file, key, message)
+
+    def cell(self, images: Mapping[str, bytes], store: Store, record: bool, line_timing: bool) -> Cell:
+        lines = self.line_units()
+        self.make_units(lines, line_timing)
+        self.make_switches()
+        self.join_wires()
+        actions = [action for n, entry in enumerate(self.description.script, 1) for action in self.actions(n, entry)]
+        self.check_nets()
+        cell = Cell(self.wiring(lines), self.parts, [Net() for _ in self.nets],
+                    [self.line(units, line_timing) for units in lines.values()],
+                    actions, store=store, record=record)  # fmt: skip
+        self.switch_on(cell, images)
+        return cell
+
+    # -- units -------------------------------------------------------------------------------------------
+
+    def make_units(self, lines: Mapping[str, list[str]], line_timing: bool) -> None:
+        straps = self.straps(lines)
+        for name, unit in self.description.units.items():
+            key = f"units.{name}"
+            found = self.models[name]
+            try:
+                keywords = catalogue.option_values(found, unit.options)
+            except CatalogueError as error:
+                raise self.problem(f"{key}.options", str(error)) from None
+            if isinstance(found, Model):
+                device: Device = found.make(straps[name], line_timing=line_timing, shaft=unit.shaft, **keywords)
+            else:
+                device = found.make(**keywords)
+            self.names.append(name)
+            self.parts.append(device)
+
+    def straps(self, lines: Mapping[str, list[str]]) -> dict[str, dict[str, Level]]:
+        """The straps of every controller, completed line by line."""
+        named: dict[str, dict[str, Level]] = {}
+        for name, unit in self.description.units.items():
+            self.models[name] = found = self.model(name, unit)
+            named[name] = {}
+            for pin, value in unit.straps.items():
+                try:
+                    named[name][pin] = catalogue.strap_level(found, pin, value)
+                except CatalogueError as error:
+                    raise self.problem(f"units.{name}.straps", str(error)) from None
+            if isinstance(found, Part) and (unit.program or unit.eeprom):
+                raise self.problem(f"units.{name}.program", f"a {found.name} holds no program: remove it")
+        on_lines = {unit for units in lines.values() for unit in units}
+        alone = {name: [name] for name, found in self.models.items() if isinstance(found, Model)}
+        for line, units in {**{n: u for n, u in alone.items() if n not in on_lines}, **lines}.items():
+            found = self.models[units[0]]
+            assert isinstance(found, Model)
+            try:
+                named.update(zip(units, found.strap_line([(unit, named[unit]) for unit in units]), strict=True))
+            except ValueError as error:
+                key = f"lines.{line}.units" if line in self.description.lines else f"units.{units[0]}.straps"
+                raise self.problem(key, str(error)) from None
+        return named
+
+    def model(self, name: str, unit: Unit) -> Model | Part:
+        if unit.model in PARTS:
+            return PARTS[unit.model]
+        if unit.model in catalogue.MODELS:
+            return catalogue.MODELS[unit.model]
+        known = (*catalogue.MODELS, *PARTS)
+        raise self.problem(f"units.{name}.model", str(catalogue.unknown("model", unit.model, known)))
+
+    # -- lines -------------------------------------------------------------------------------------------
+
+    def line_units(self) -> dict[str, list[str]]:
+        """The units on each line. A cell that names no lines has one for each controller."""
+        described = self.description
+        if not described.lines:
+            return {name: [name] for name, unit in described.units.items() if unit.model not in PARTS}
+        seen: dict[str, str] = {}
+        for line, entry in described.lines.items():
+            if not entry.units:
+                raise self.problem(f"lines.{line}.units", "a line needs at least one unit")
+            for unit in entry.units:
+                self.need_unit(f"lines.{line}.units", unit)
+                if described.units[unit].model in PARTS:
+                    raise self.problem(f"lines.{line}.units", f"{unit} has no serial port: remove it")
+                if unit in seen:
+                    raise self.problem(f"lines.{line}.units", f"{unit} is on line {seen[unit]} already: choose one")
+                seen[unit] = line
+        return {line: list(entry.units) for line, entry in described.lines.items()}
+
+    def line(self, units: list[str], timed: bool) -> Line:
+        """The line itself; all its units have the same character format."""
+        forms = {unit: self.controller(unit).line_format for unit in units}
+        first = forms[units[0]]
+        for unit, form in forms.items():
+            if form != first:
+                what = f"{units[0]} is strapped for {first}, {unit} for {form}: units on one line need the same"
+                raise self.problem(f"units.{unit}.straps", what)
+        return Line(first, timed=timed)
+
+    # -- switches and wires ------------------------------------------------------------------------------
+
+    def make_switches(self) -> None:
+        for name, entry in self.description.switches.items():
+            if name in self.description.units:
+                raise self.problem(f"switches.{name}", "a unit has this name already: choose another")
+            switch = Switch(entry.level)
+            if entry.axis is not None:
+                self.need_unit(f"switches.{name}.axis", entry.axis)
+                if entry.axis not in self.axis_units():
+                    raise self.problem(f"switches.{name}.axis", f"{entry.axis} moves no axis: name a controller")
+                switch = AxisSwitch(*entry.range, entry.inside, self.description.units[entry.axis].shaft)
+                self.axes[len(self.parts)] = self.names.index(entry.axis)
+            self.names.append(name)
+            self.parts.append(switch)
+
+    def join_wires(self) -> None:
+        for name, entry in self.description.switches.items():
+            key = f"switches.{name}.drives"
+            contact = _End(self.names.index(name), Switch.pins[0], name)
+            for target in entry.drives:
+                self.join(key, contact, self.end(key, target))
+        for n, wire in enumerate(self.description.wires, 1):
+            source = self.end(f"wires[{n}].from", wire.source)
+            if not source.pin.kind.drives:
+                raise self.problem(f"wires[{n}].from", f"{wire.source} is no output: a wire starts at one")
+            for target in wire.to:
+                self.join(f"wires[{n}].to", source, self.end(f"wires[{n}].to", target))
+
+    def end(self, key: str, text: str) -> _End:
+        """The pin that ``UNIT.PIN`` names."""
+        name, dot, pin = text.partition(".")
+        if not dot:
+            raise self.problem(key, f"{text!r} names no pin: write UNIT.PIN")
+        self.need_unit(key, name)
+        wired = [p for p in self.parts[self.names.index(name)].pins if p.kind.drives or p.kind.reads]
+        for found in wired:
+            if found.name == pin:
+                return _End(self.names.index(name), found, text)
+        raise self.problem(key, str(catalogue.unknown(f"pin of {name} that takes a wire", pin, [p.name for p in wired])))
+
+    def join(self, key: str, one: _End, other: _End) -> None:
+        """Put both pins on one net, with everything that is on theirs."""
+        if one == other:
+            raise self.problem(key, f"{one.text} is wired to itself: remove the wire")
+        first = self.net(one)
+        second = self.net(other)
+        if first != second:
+            for end in self.nets[second]:
+                self.net_of[end.part, end.pin.name] = first
+            self.nets[first] += self.nets[second]
+            self.nets[second] = []
+
+    def net(self, end: _End) -> int:
+        place = (end.part, end.pin.name)
+        if place not in self.net_of:
+            self.net_of[place] = len(self.nets)
+            self.nets.append([end])
+        return self.net_of[place]
+
+    def check_nets(self) -> None:
+        """One push-pull output at most on a net, and then nothing else that pulls."""
+        for ends in self.nets:
+            drivers = [end for end in ends if end.pin.kind.drives]
+            if len(drivers) > 1 and any(end.pin.kind is PinKind.OUTPUT for end in drivers):
+                pins = " and ".join(end.text for end in drivers)
+                raise self.problem("wires", f"{pins} drive the same wire: only open collectors may share one")
+
+    def wiring(self, lines: Mapping[str, list[str]]) -> Wiring:
+        units = len(self.description.units)
+        drives: list[dict[str, int]] = [{} for _ in self.parts]
+        reads: list[tuple[tuple[int, str], ...]] = []
+        for number, ends in enumerate(self.nets):
+            for end in ends:
+                if end.pin.kind.drives:
+                    drives[end.part][end.pin.name] = number
+            reads.append(tuple((end.part, end.pin.name) for end in ends if end.pin.kind.reads))
+        for part, pins in enumerate(drives):
+            for pin in pins:
+                self.parts[part].watch(pin)
+        followers = [tuple(s for s, unit in self.axes.items() if unit == part) for part in range(len(self.parts))]
+        line_units = tuple(tuple(self.names.index(unit) for unit in of_line) for of_line in lines.values())
+        line_of = tuple(next((n for n, of in enumerate(line_units) if unit in of), -1) for unit in range(units))
+        return Wiring(tuple(self.names), units, tuple(drives), tuple(reads), tuple(followers),
+                      line_units, tuple(lines), line_of)  # fmt: skip
+
+    # -- script ------------------------------------------------------------------------------------------
+
+    def actions(self, number: int, entry: ScriptEntry) -> list[Action]:
+        """What one ``[[script]]`` entry does, in the order set, power, send."""
+        key = f"script[{number}]"
+        found = []
+        for target, level in entry.set.items():
+            name = self.settable(f"{key}.set", target)
+            found.append(Action(entry.at, f"{target} = {level}", _Set(name, level)))
+        for unit, on in entry.power.items():
+            self.need_unit(f"{key}.power", unit)
+            found.append(Action(entry.at, f"{unit} power {'on' if on else 'off'}", _Power(unit, on)))
+        if entry.send:
+            if entry.to is None:
+                raise self.problem(f"{key}.to", "say which unit the line is for: to = 'UNIT'")
+            self.need_unit(f"{key}.to", entry.to)
+            if entry.to not in {unit for units in self.line_units().values() for unit in units}:
+                raise self.problem(f"{key}.to", f"{entry.to} is on no line: put it on one in [lines]")
+            for text in entry.send:
+                found.append(Action(entry.at, f"{entry.to} <- {text}", _Type(entry.to, text)))
+        return found
+
+    def settable(self, key: str, target: str) -> str:
+        """The switch that the script sets: one of the cell, or one of its own on a free input."""
+        if target in self.description.switches or target in self.names:
+            if target in self.description.units:
+                raise self.problem(key, f"{target} is a unit: write {target}.PIN")
+            return target
+        if "." not in target:
+            known = [*self.description.switches, "UNIT.PIN"]
+            raise self.problem(key, str(catalogue.unknown("switch", target, known)))
+        end = self.end(key, target)
+        if not end.pin.kind.reads:
+            raise self.problem(key, f"{target} is an output: the unit sets it")
+        drivers = [e.text for e in self.nets[self.net(end)] if e.pin.kind.drives]
+        if drivers:
+            raise self.problem(key, f"{drivers[0]} drives {target}: set that instead, or cut the wire")
+        self.names.append(target)
+        self.parts.append(Switch(HIGH))
+        self.join(key, _End(len(self.parts) - 1, Switch.pins[0], target), end)
+        return target
+
+    # -- power -------------------------------------------------------------------------------------------
+
+    def switch_on(self, cell: Cell, images: Mapping[str, bytes]) -> None:
+        """Contacts first, so that every unit finds its inputs as they are; then units, then programs."""
+        units = self.description.units
+        for index in range(len(units), len(self.parts)):
+            cell.switch_on(index)
+        programs = {name: self.image(name, unit, "program") for name, unit in units.items() if unit.program}
+        for name, unit in units.items():
+            if unit.eeprom or name in images:
+                image = images[name] if name in images else self.image(name, unit, "eeprom")
+                try:
+                    self.controller(name).restore(image)
+                except ImageError as error:
+                    raise self.problem(f"units.{name}", f"its stored image is damaged: {error}") from None
+        for name, unit in units.items():
+            if unit.powered:
+                cell.power(name, True)
+        for name, image in programs.items():
+            self.controller(name).load(image, cell.now)
+            cell.start(name)
+
+    def image(self, name: str, unit: Unit, key: str) -> bytes:
+        """The program image in the file that `key` of the unit names."""
+        file = getattr(unit, key)
+        where = f"units.{name}.{key}"
+        try:
+            text = self.read(file)
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "it is no text file"
+            raise self.problem(where, f"cannot read {file}: {reason or error}") from None
+        try:
+            return assemble(catalogue.language(unit.model), text, file).image
+        except AssemblyFailed as error:
+            raise self.problem(where, str(error)) from None
+
+    # -- names -------------------------------------------------------------------------------------------
+
+    def axis_units(self) -> list[str]:
+        return [name for name, found in self.models.items() if isinstance(found, Model)]
+
+    def controller(self, name: str) -> Controller:
+        device = self.parts[self.names.index(name)]
+        assert isinstance(self.models[name], Model)
+        return device  # type: ignore[return-value]
+
+    def need_unit(self, key: str, name: str) -> None:
+        if name not in self.description.units:
+            raise self.problem(key, str(catalogue.unknown("unit", name, tuple(self.description.units))))
+
+
+class _Set(NamedTuple):
+    """Put a switch to a level."""
+
+    switch: str
+    level: Level
+
+    def __call__(self, cell: Cell) -> None:
+        cell.set_switch(self.switch, self.level)
+
+
+class _Power(NamedTuple):
+    """Switch a unit's supply."""
+
+    unit: str
+    on: bool
+
+    def __call__(self, cell: Cell) -> None:
+        cell.power(self.unit, self.on)
+
+
+class _Type(NamedTuple):
+    """Send a command line to a unit."""
+
+    unit: str
+    text: str
+
+    def __call__(self, cell: Cell) -> None:
+        cell.type(self.unit, self.text)

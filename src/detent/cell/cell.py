@@ -1,0 +1,320 @@
+"""The scheduler: who is due when, and what reaches whom.
+
+Order within one instant (the contract of `controllers.device`): parts that are due are advanced in file
+order; what they did is delivered in rounds, parts in file order, their outputs in the order they were made
+and never merged; what a round causes is delivered in the next. More than `MOST_DELIVERIES` in one instant
+is an oscillation, and an error that names its pins.
+"""
+
+import copy
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, Protocol, TypeAlias
+
+from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.cell.recording import InputSet, Received, Recording
+from detent.controllers.device import Controller, Device, Output, Powered, StoreImage
+from detent.lines.line import Line
+from detent.pins import HIGH, Level, Net, PinSet
+from detent.ticks import NEVER, Ns
+from detent.uart import Sent
+
+MOST_DELIVERIES = 1_000
+
+Store: TypeAlias = Callable[[str, bytes], bool]
+"""Write the non-volatile image of a unit; say whether that succeeded."""
+
+
+class Oscillation(RuntimeError):
+    """Outputs change each other without end in one instant."""
+
+
+class Follower(Protocol):
+    """A part that follows the axis of a unit: a switch at a position, a motor with its load."""
+
+    def follow(self, motion: MotionStarted | MotionCut | MotionEnded) -> None:
+        """The axis does this."""
+
+
+class Deed(Protocol):
+    """Something that a script does to its cell. Immutable."""
+
+    def __call__(self, cell: "Cell", /) -> None:
+        """Do it, now."""
+
+
+class Action(NamedTuple):
+    """One entry of the cell's script: at this time, this is done to the cell."""
+
+    at: Ns
+    what: str  # for people
+    do: Deed
+
+    def __deepcopy__(self, _: object) -> "Action":
+        return self
+
+
+class Wiring(NamedTuple):
+    """What never changes in a cell: copied by reference. Parts are meant by their index in `Cell.parts`."""
+
+    names: tuple[str, ...]  # of all parts
+    units: int  # the first so many parts are units: recorded, powered, on lines
+    drives: tuple[Mapping[str, int], ...]  # part -> pin -> net
+    reads: tuple[tuple[tuple[int, str], ...], ...]  # net -> (part, pin)
+    followers: tuple[tuple[int, ...], ...]  # part -> parts that follow its axis
+    lines: tuple[tuple[int, ...], ...]  # line -> units on it
+    line_names: tuple[str, ...]
+    line_of: tuple[int, ...]  # unit -> line; -1: none
+
+    def __deepcopy__(self, _: object) -> "Wiring":
+        return self
+
+
+def no_store(unit: str, image: bytes) -> bool:
+    """Images stay in the units' own memory: what a cell does that nobody gave a place for files."""
+    return True
+
+
+class Cell:
+    """Everything in one virtual time. Made by `detent.cell.build`."""
+
+    def __init__(
+        self,
+        wiring: Wiring,
+        parts: Sequence[Device],
+        nets: Sequence[Net],
+        lines: Sequence[Line],
+        script: Sequence[Action] = (),
+        *,
+        store: Store = no_store,
+        record: bool = True,
+    ) -> None:
+        self.wiring = wiring
+        self.parts = list(parts)
+        self.nets = list(nets)
+        self.lines = list(lines)
+        self.now: Ns = 0
+        self.store = store
+        self.recording: Recording | None = Recording(wiring.names[: wiring.units]) if record else None
+        self._script = tuple(sorted(script, key=lambda action: action.at))
+        self._next_action = 0
+        self._deadlines: list[Ns] = [NEVER] * len(parts)
+        self._line_deadline: Ns = NEVER  # the earliest of all lines
+        self._script_deadline: Ns = self._script[0].at if self._script else NEVER
+        self._touched: set[int] = set()
+        self._instant: Ns = -1
+        self._deliveries: Counter[str] = Counter()  # of this instant, by pin
+
+    # -- time --------------------------------------------------------------------------------------------
+
+    def next_event(self) -> Ns | None:
+        """When something happens next by itself; None: nothing is left to do."""
+        at = self._next()
+        return None if at >= NEVER else at
+
+    def run_to(self, until: Ns) -> None:
+        """Let everything happen up to and including `until`; then it is `until`."""
+        while (at := self._next()) <= until:
+            self._advance(at)
+        self.now = max(self.now, until)
+
+    def step(self) -> Ns | None:
+        """Let everything of the next eventful instant happen; return it, None if nothing is left to do."""
+        at = self.next_event()
+        if at is not None:
+            self._advance(at)
+        return at
+
+    def _next(self) -> Ns:
+        return min(min(self._deadlines), self._line_deadline, self._script_deadline)
+
+    def _advance(self, at: Ns) -> None:
+        """One instant: the parts' own deadlines, then pins and power, then characters."""
+        self.now = at
+        for index, deadline in enumerate(self._deadlines):
+            if deadline <= at:
+                self.parts[index].advance(at)
+                self._touched.add(index)
+        self._settle()
+        if self._script_deadline <= at:
+            self._act(at)
+        if self._line_deadline <= at:
+            self._hear(at)
+
+    # -- what the outside does ---------------------------------------------------------------------------
+
+    def send(self, line: int, data: bytes) -> None:
+        """The host of a line sends `data`, now."""
+        self.lines[line].send(data, self.now)
+        self._plan_lines()
+        self._catch_up()
+
+    def type(self, unit: str, text: str) -> None:
+        """The host of the unit's line sends the command line `text` to that unit, now."""
+        index = self.unit(unit)
+        line = self.wiring.line_of[index]
+        if line < 0:
+            raise ValueError(f"unit {unit!r} is on no line")
+        self.send(line, self.controller(unit).frame(text))
+
+    def set_pin(self, unit: str, pin: str, level: Level) -> None:
+        """Drive an input pin from outside, now: a probe, or a hand with a wire. Other drivers of its net are not asked."""
+        self._set_pin(self.unit(unit), pin, level)
+        self._settle()
+
+    def set_switch(self, name: str, level: Level) -> None:
+        """Put a switch of the cell to `level`, now."""
+        index = self.wiring.names.index(name, self.wiring.units)
+        self.parts[index].set_pin("SET", level, self.now)
+        self._touched.add(index)
+        self._settle()
+
+    def power(self, unit: str, on: bool) -> None:
+        """Switch the supply of a unit, now."""
+        index = self.unit(unit)
+        self.parts[index].power(on, self.now)
+        self._touched.add(index)
+        self._settle()
+
+    def switch_on(self, part: int) -> None:
+        """Let a part that is no unit (a contact) tell its level, now."""
+        self.parts[part].power(True, self.now)
+        self._touched.add(part)
+        self._settle()
+
+    def start(self, unit: str) -> None:
+        """Start the program in the unit's memory, now."""
+        self.controller(unit).start(self.now)
+        self._touched.add(self.unit(unit))
+        self._settle()
+
+    # -- looking -----------------------------------------------------------------------------------------
+
+    def unit(self, name: str) -> int:
+        """The index of a unit. Raises KeyError."""
+        try:
+            return self.wiring.names.index(name, 0, self.wiring.units)
+        except ValueError:
+            raise KeyError(f"no unit {name!r} in this cell") from None
+
+    def controller(self, name: str) -> Controller:
+        """The controller of that name. Raises KeyError, TypeError if the unit is none."""
+        part = self.parts[self.unit(name)]
+        if not hasattr(part, "status"):
+            raise TypeError(f"unit {name!r} is not a controller")
+        return part  # type: ignore[return-value]
+
+    def controllers(self) -> dict[str, Controller]:
+        """All controllers by name, in file order."""
+        names = self.wiring.names[: self.wiring.units]
+        return {name: self.controller(name) for i, name in enumerate(names) if hasattr(self.parts[i], "status")}
+
+    def copy(self) -> "Cell":
+        """An independent cell that goes on exactly as this one would."""
+        return copy.deepcopy(self)
+
+    # -- what reaches whom -------------------------------------------------------------------------------
+
+    def _settle(self) -> None:
+        """Deliver in rounds until nobody has anything more to tell."""
+        parts, touched, deadlines = self.parts, self._touched, self._deadlines
+        while touched:
+            round_ = sorted(touched) if len(touched) > 1 else list(touched)
+            touched.clear()
+            told = []
+            for index in round_:
+                part = parts[index]
+                out = part.drain()
+                deadline = part.next_deadline()
+                deadlines[index] = NEVER if deadline is None else deadline
+                if out:
+                    told.append((index, out))
+            for index, out in told:
+                self._deliver(index, out)
+
+    def _deliver(self, index: int, out: Sequence[Output]) -> None:
+        if index < self.wiring.units and self.recording is not None:
+            self.recording.extend(index, out)
+        drives = self.wiring.drives[index]
+        for item in out:
+            kind = type(item)
+            if kind is PinSet:
+                net = drives.get(item.pin)  # type: ignore[union-attr]
+                if net is not None:
+                    self._drive(net, (index, item.pin), item.level)  # type: ignore[union-attr]
+            elif kind is Sent:
+                line = self.wiring.line_of[index]
+                if line >= 0:
+                    self.lines[line].from_unit(item)  # type: ignore[arg-type]
+                    self._plan_lines()
+            elif kind in _MOTION:
+                for follower in self.wiring.followers[index]:
+                    self.parts[follower].follow(item)  # type: ignore[attr-defined]
+                    self._touched.add(follower)
+            elif kind is StoreImage:
+                ok = self.store(self.wiring.names[index], item.image)  # type: ignore[union-attr]
+                self.parts[index].stored(ok, self.now)
+                self._touched.add(index)
+            elif kind is Powered and not item.on:  # type: ignore[union-attr]
+                for pin, net in drives.items():
+                    self._drive(net, (index, pin), HIGH)
+
+    def _drive(self, net: int, driver: tuple[int, str], level: Level) -> None:
+        wire = self.nets[net]
+        if wire.drive(driver, level):
+            for part, pin in self.wiring.reads[net]:
+                self._set_pin(part, pin, wire.level)
+
+    def _set_pin(self, index: int, pin: str, level: Level) -> None:
+        if self._instant != self.now:
+            self._instant = self.now
+            self._deliveries.clear()
+        name = f"{self.wiring.names[index]}.{pin}"
+        self._deliveries[name] += 1
+        if self._deliveries.total() > MOST_DELIVERIES:
+            pins = ", ".join(pin for pin, count in self._deliveries.most_common(8) if count > 1)
+            raise Oscillation(
+                f"more than {MOST_DELIVERIES} level changes at {self.now} ns: {pins} change each other without end; "
+                "break the loop or put something that takes time into it"
+            )
+        if index < self.wiring.units and self.recording is not None:
+            self.recording.extend(index, (InputSet(self.now, pin, level),))
+        self.parts[index].set_pin(pin, level, self.now)
+        self._touched.add(index)
+
+    def _plan_lines(self) -> None:
+        self._line_deadline = min((line.deadline for line in self.lines), default=NEVER)
+
+    def _hear(self, at: Ns) -> None:
+        """Characters whose stop bits end now reach the units of their lines."""
+        for line, units in zip(self.lines, self.wiring.lines, strict=True):
+            if line.deadline > at:
+                continue
+            arrived = line.advance(at)
+            if not arrived:
+                continue
+            chars = [sent.char for sent in arrived]
+            for unit in units:
+                if self.recording is not None:
+                    self.recording.extend(unit, [Received(s.done, "RXD", s.char, s.at) for s in arrived])
+                self.parts[unit].receive("RXD", chars, at)
+                self._touched.add(unit)
+        self._plan_lines()
+        self._settle()
+
+    def _act(self, at: Ns) -> None:
+        """Carry out the script's actions that are due."""
+        while self._next_action < len(self._script) and self._script[self._next_action].at <= at:
+            action = self._script[self._next_action]
+            self._next_action += 1
+            action.do(self)
+        left = self._script[self._next_action :]
+        self._script_deadline = left[0].at if left else NEVER
+
+    def _catch_up(self) -> None:
+        """What an action from outside makes due in this very instant happens in it."""
+        while self._next() <= self.now:
+            self._advance(self.now)
+
+
+_MOTION = (MotionStarted, MotionCut, MotionEnded)

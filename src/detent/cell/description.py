@@ -1,0 +1,209 @@
+"""A cell as its TOML file describes it, checked for form; `build` checks it for sense.
+
+Every fault becomes a `Problem`: one line with the file, the key and what to do. Reading files is the caller's
+business; this module is given text.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Annotated, Any
+
+from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from detent.pins import HIGH, LOW, Level
+from detent.ticks import Ns, parse_duration
+
+MOST_PROBLEMS = 5
+
+
+class Problem(ValueError):
+    """Something wrong with a cell, a program or a choice. `str` is one line: file, key, what, remedy."""
+
+    def __init__(self, file: str, key: str, message: str) -> None:
+        super().__init__(": ".join(part for part in (file, key, message) if part))
+        self.file, self.key, self.message = file, key, message
+
+
+def _level(value: object) -> Level:
+    levels: dict[object, Level] = {"0": LOW, "low": LOW, "1": HIGH, "high": HIGH}
+    text = str(value).strip().lower()
+    if isinstance(value, bool) or text not in levels:
+        raise ValueError("a level is 0, 1, low or high")
+    return levels[text]
+
+
+def _duration(value: object) -> Ns:
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise ValueError("write a time like 1.5 (seconds) or '400 us'")
+    return parse_duration(value)
+
+
+def _list(value: object) -> object:
+    return [value] if isinstance(value, str) else value
+
+
+LevelField = Annotated[Level, BeforeValidator(_level)]
+DurationField = Annotated[Ns, BeforeValidator(_duration)]
+Names = Annotated[list[str], BeforeValidator(_list)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Unit(_Table):
+    """``[units.NAME]``: a controller, or another part with pins."""
+
+    model: str
+    program: str | None = None  # file, loaded into program memory and started when the cell starts
+    eeprom: str | None = None  # file, in non-volatile memory unless an image is kept for the unit
+    straps: dict[str, int | str] = {}
+    options: dict[str, int | float | str] = {}
+    powered: bool = True  # when the cell starts
+    shaft: int = 0  # where the axis stands when the cell starts, in steps
+
+
+class Wire(_Table):
+    """``[[wires]]``: an output to one input or several."""
+
+    source: str = Field(validation_alias=AliasChoices("from"))
+    to: Names
+
+
+class Switch(_Table):
+    """``[switches.NAME]``: a contact that drives pins, set by the script or by an axis."""
+
+    drives: Names
+    level: LevelField = HIGH  # when the cell starts; an axis decides for itself
+    axis: str | None = None  # the unit whose axis moves the contact
+    start: int | None = Field(None, validation_alias=AliasChoices("from"))
+    end: int | None = Field(None, validation_alias=AliasChoices("to"))
+    at: int | None = None  # the same as from and to
+    inside: LevelField = LOW  # the level between from and to
+
+    @model_validator(mode="after")
+    def _placed(self) -> "Switch":
+        places = (self.start, self.end, self.at)
+        if self.axis is None and any(place is not None for place in places):
+            raise ValueError("from, to and at are places on an axis: name it with axis = 'UNIT'")
+        if self.axis is not None and all(place is None for place in places):
+            raise ValueError("a switch on an axis needs its place: at, or from and to, in steps")
+        if self.at is not None and (self.start is not None or self.end is not None):
+            raise ValueError("give either at, or from and to")
+        if self.start is not None and self.end is not None and self.start > self.end:
+            raise ValueError("from must not be greater than to")
+        return self
+
+    @property
+    def range(self) -> tuple[int | None, int | None]:
+        """First and last step at which the level is `inside`."""
+        return (self.at, self.at) if self.at is not None else (self.start, self.end)
+
+
+class Line(_Table):
+    """``[lines.NAME]``: the units on one serial line, and where a host finds it."""
+
+    units: Names
+    endpoint: str | None = None  # 'pty', 'pty:LINK', 'tcp:HOST:PORT' or 'serial:DEVICE'
+
+
+class ScriptEntry(_Table):
+    """``[[script]]``: what is done to the cell at a time."""
+
+    at: DurationField
+    set: dict[str, LevelField] = {}  # switches, or inputs that nothing else drives
+    send: Names = []  # command lines, to the unit `to`
+    to: str | None = None
+    power: dict[str, bool] = {}
+
+    @model_validator(mode="after")
+    def _something(self) -> "ScriptEntry":
+        if not (self.set or self.send or self.power):
+            raise ValueError("nothing to do: give set, send or power")
+        return self
+
+
+class Description(_Table):
+    """A whole cell file. `file` is its name in error messages."""
+
+    title: str = ""
+    units: dict[str, Unit]
+    wires: list[Wire] = []
+    switches: dict[str, Switch] = {}
+    lines: dict[str, Line] = {}
+    script: list[ScriptEntry] = []
+    file: str = ""
+
+    @model_validator(mode="after")
+    def _units(self) -> "Description":
+        if not self.units:
+            raise ValueError("a cell needs at least one unit: [units.NAME] with model = 'gs-c200'")
+        return self
+
+
+def parse(text: str, file: str) -> Description:
+    """The description in the TOML `text`. Raises Problem."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise Problem(file, "", f"this is no TOML: {error}") from None
+    if "file" in data:
+        raise Problem(file, "file", "there is no such key; remove it")
+    return _validate({**data, "file": file}, file)
+
+
+def single(
+    model: str,
+    *,
+    straps: Mapping[str, int | str] | None = None,
+    options: Mapping[str, int | float | str] | None = None,
+    program: str | None = None,
+) -> Description:
+    """A cell of one unit, named like its model. Raises Problem."""
+    unit = {"model": model, "straps": dict(straps or {}), "options": dict(options or {}), "program": program}
+    return _validate({"units": {model: unit}}, "")
+
+
+def _validate(data: dict[str, Any], file: str) -> Description:
+    try:
+        return Description.model_validate(data)
+    except ValidationError as error:
+        faults = [_fault(item, data) for item in error.errors()]
+        key, message = faults[0]
+        more = "".join(f"; {k}: {m}" if k else f"; {m}" for k, m in faults[1:MOST_PROBLEMS])
+        left = len(faults) - MOST_PROBLEMS
+        raise Problem(file, key, message + more + (f"; and {left} more" if left > 0 else "")) from None
+
+
+def _fault(item: Any, data: dict[str, Any]) -> tuple[str, str]:
+    """The key and the message of one of pydantic's errors."""
+    path: list[str] = []
+    for part in item["loc"]:
+        if isinstance(part, int):
+            path[-1] += f"[{part + 1}]"
+        else:
+            path.append(str(part))
+    key = ".".join(path)
+    if item["type"] == "extra_forbidden":
+        known = _known(item["loc"])
+        near = get_close_matches(str(item["loc"][-1]), known, 1, 0.5)
+        hint = f"did you mean {near[0]}? " if near else ""
+        return key, f"there is no such key; {hint}there are: {', '.join(known)}"
+    if item["type"] == "missing":
+        return key, "this key is missing"
+    message = item["msg"].removeprefix("Value error, ")
+    return key, f"{message} (it is {item['input']!r})" if not isinstance(item["input"], dict) else message
+
+
+def _known(location: tuple[int | str, ...]) -> list[str]:
+    """The keys that the table of a wrong key takes."""
+    tables: dict[str, type[BaseModel]] = {
+        "units": Unit, "wires": Wire, "switches": Switch, "lines": Line, "script": ScriptEntry
+    }  # fmt: skip
+    table = tables.get(str(location[0]), Description) if len(location) > 1 else Description
+    names = []
+    for name, field in table.model_fields.items():
+        alias = field.validation_alias
+        names.append(str(alias.choices[0]) if isinstance(alias, AliasChoices) else name)
+    return [name for name in names if name != "file"]

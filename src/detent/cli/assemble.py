@@ -1,0 +1,202 @@
+"""The verbs around program source: `asm`, `list`, `disasm`."""
+
+import json as json_text
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Literal
+
+from detent.assembler import (
+    Assembly,
+    AssemblyFailed,
+    ImageError,
+    Language,
+    assemble,
+    disassemble,
+    listing,
+)
+from detent.realtime.files import write_whole
+
+FAILED = 1
+ASKED_WRONGLY = 2
+
+
+def asm(
+    model: str,
+    file: Path,
+    *,
+    output: Path | None = None,
+    format: Literal["image", "hex", "commands"] | None = None,
+    json: bool = False,
+) -> None:
+    """Assemble a program: commands with labels and comments in, commands for the wire or an image out.
+
+    The source has one command a line as typed on the wire, `label:` where a jump leads, and `;` before
+    a comment. The commands are printed with their addresses filled in, and how much memory they take.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, gs-c200s, ...
+    file
+        The source.
+    output
+        A file to write; it is replaced whole or not at all.
+    format
+        What to write: the image as bytes (the default for a file), the image in hex, or the commands (the
+        default for the terminal).
+    json
+        Print everything as JSON: commands, addresses, labels, image, bytes used.
+    """
+    if format == "image" and output is None:
+        raise _asked_wrongly("an image is bytes and needs a file: add --output FILE, or choose --format hex")
+    assembly = _assembly(model, file, json)
+    if output is not None:
+        _write(output, _formatted(assembly, format or "image"))
+    if json:
+        _print_json({**_facts(assembly), "output": str(output) if output else None})
+    else:
+        shown = "hex" if format == "hex" and output is None else "commands"
+        print(_formatted(assembly, shown).decode(), end="")
+        # a comment, so that what is printed can be kept as a program file
+        print(f"{assembly.language.comment} {assembly.used} of {assembly.capacity} bytes")
+
+
+def list_(model: str, file: Path, *, json: bool = False) -> None:
+    """List a program source with the address, length and bytes of every instruction.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, gs-c200s, ...
+    file
+        The source.
+    json
+        Print the listing as JSON.
+    """
+    assembly = _assembly(model, file, json)
+    if json:
+        _print_json(_facts(assembly))
+    else:
+        print(listing(assembly), end="")
+
+
+def disasm(model: str, file: Path, *, output: Path | None = None, json: bool = False) -> None:
+    """Turn a program image back into source, with a label wherever a jump leads.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, gs-c200s, ...
+    file
+        The image, as `asm` and the controller's EEPROM file have it.
+    output
+        A file to write instead of the terminal; it is replaced whole or not at all.
+    json
+        Print the source and its facts as JSON.
+    """
+    language = _language(model)
+    image = _read(file)
+    try:
+        source = disassemble(language, image)
+    except ImageError as error:
+        raise _asked_wrongly(f"{file}: {error}; is it an image for the {model}?") from error
+    if output is not None:
+        _write(output, source.encode())
+    if json:
+        written = str(output) if output else None
+        facts = {"model": model, "file": str(file), "bytes_used": len(image), "source": source}
+        _print_json({**facts, "output": written})
+    elif output is None:
+        print(source, end="")
+
+
+def _language(model: str) -> Language[Any]:
+    """The program language of `model`."""
+    # imported here, as it brings all controllers with it and --help needs none
+    from detent.controllers.catalogue import CatalogueError, language
+
+    try:
+        return language(model)
+    except CatalogueError as error:
+        raise _asked_wrongly(str(error)) from error
+
+
+def _assembly(model: str, file: Path, json: bool) -> Assembly[Any]:
+    """The assembled source; every error of it is reported before the program ends."""
+    language = _language(model)
+    try:
+        source = _read(file).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        hint = "is it an image? Then use disasm"
+        raise _asked_wrongly(f"{file}: byte {error.start} is not text in UTF-8; {hint}") from error
+    try:
+        return assemble(language, source, str(file))
+    except AssemblyFailed as failed:
+        if json:
+            errors = [{"file": failed.name, **error._asdict()} for error in failed.errors]
+            _print_json({"model": model, "errors": errors})
+        raise _asked_wrongly(str(failed)) from failed
+
+
+def _formatted(assembly: Assembly[Any], format: str) -> bytes:
+    """What a file in `format` holds."""
+    match format:
+        case "image":
+            return assembly.image
+        case "hex":
+            image = assembly.image
+            return _lines(image[at : at + 16].hex(" ").upper() for at in range(0, len(image), 16))
+        case _:
+            return _lines(assembly.commands)
+
+
+def _lines(texts: Iterable[str]) -> bytes:
+    return "".join(f"{text}\n" for text in texts).encode()
+
+
+def _facts(assembly: Assembly[Any]) -> dict[str, Any]:
+    """What `--json` tells of a program."""
+    return {
+        "model": assembly.language.model,
+        "file": assembly.name,
+        "bytes_used": assembly.used,
+        "capacity": assembly.capacity,
+        "labels": dict(assembly.symbols),
+        "image": assembly.image.hex(),
+        "instructions": [
+            {
+                "address": placed.address,
+                "bytes": placed.code.hex(),
+                "command": placed.text,
+                "line": placed.line,
+                "source": assembly.lines[placed.line - 1],
+            }
+            for placed in assembly.placed
+        ],
+    }
+
+
+def _print_json(facts: dict[str, Any]) -> None:
+    print(json_text.dumps(facts))
+
+
+def _read(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as error:
+        raise _asked_wrongly(f"{file}: {error.strerror or error}") from error
+
+
+def _write(file: Path, data: bytes) -> None:
+    try:
+        write_whole(file, data)
+    except OSError as error:
+        print(f"{file}: not written: {error.strerror or error}", file=sys.stderr)
+        raise SystemExit(FAILED) from error
+
+
+def _asked_wrongly(message: str) -> SystemExit:
+    """The way out after a request that cannot be met; `message` has gone to stderr."""
+    print(message, file=sys.stderr)
+    return SystemExit(ASKED_WRONGLY)

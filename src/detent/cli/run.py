@@ -1,0 +1,194 @@
+"""The verb `run`: a cell in virtual time, as fast as it goes."""
+
+import json as json_text
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from detent.cell.cell import Cell
+    from detent.ticks import Ns
+
+MOST_INSTANTS = 500_000  # eventful instants without --for, after which a cell counts as endless
+
+
+def run(
+    target: str,
+    *,
+    program: Sequence[str] = (),
+    send: Sequence[str] = (),
+    for_: Annotated[str | None, Parameter(name="--for")] = None,
+    plot: Path | None = None,
+    vcd: Path | None = None,
+    sr: Path | None = None,
+    npz: Path | None = None,
+    strap: Sequence[str] = (),
+    set_: Annotated[Sequence[str], Parameter(name="--set")] = (),
+    line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
+    json: bool = False,
+) -> None:
+    """Run a controller or a cell in virtual time and say where everything ended.
+
+    Without --for it ends when nothing is left to do.
+
+    Parameters
+    ----------
+    target
+        A model by name, or a cell file (CELL.toml).
+    program
+        A program to load and execute: FILE, or UNIT=FILE for a cell.
+    send
+        A command line for the unit to receive, without checksum and carriage return, which are added. Given
+        several times: each is sent when the one before has been answered. UNIT:LINE for a cell.
+    for_
+        Virtual time to run, like 2.5 (seconds), '400 ms' or '1 h'.
+    plot
+        Draw positions, speeds and pins over time: a .png, .svg or .pdf file.
+    vcd
+        Write a value change dump with every pin and pulse (GTKWave, PulseView).
+    sr
+        Write a sigrok session (PulseView, sigrok-cli).
+    npz
+        Write pulse times and pin changes as NumPy arrays.
+    strap
+        PIN=LEVEL (low, high, open), or UNIT.PIN=LEVEL for a cell.
+    set_
+        OPTION=VALUE, or UNIT.OPTION=VALUE for a cell.
+    line_timing
+        Let characters take their time on the serial line.
+    json
+        Print the result as one line of JSON.
+    """
+    from detent.cell.build import build
+    from detent.cell.cell import Oscillation
+    from detent.cell.description import Problem
+    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.target import target as find
+    from detent.ticks import parse_duration
+
+    try:
+        found = find(target, straps=strap, options=set_, programs=program)
+        until = None if for_ is None else parse_duration(for_)
+        wanted = [path for path in (plot, vcd, sr, npz) if path is not None]
+        cell = build(found.description, found.read, record=bool(wanted), line_timing=line_timing)
+        lines = [_addressed(cell, text) for text in send]
+    except Problem as error:
+        asked_wrongly(error)
+    except ValueError as error:
+        asked_wrongly(ValueError(f"--for: {error}"))
+    try:
+        exchanges = [exchange for unit, text in lines for exchange in _exchange(cell, unit, text)]
+        ended = _run_on(cell, until)
+    except Oscillation as error:
+        failed(error)
+    for path, write in ((vcd, "vcd"), (sr, "sigrok"), (npz, "arrays"), (plot, "figures")):
+        if path is not None:
+            _write(write, path, cell, found.description.title or found.name)
+    if json:
+        print(json_text.dumps(_result(cell, ended, exchanges)))
+    else:
+        _print_result(cell, ended, exchanges, wanted)
+
+
+class Exchange(NamedTuple):
+    """A command line and what came back."""
+
+    unit: str
+    sent: str
+    answers: list[str]
+
+
+def _addressed(cell: "Cell", text: str) -> tuple[str, str]:
+    """The unit a line is for, and the line."""
+    from detent.cell.description import Problem
+    from detent.controllers.catalogue import unknown
+
+    units = list(cell.controllers())
+    if len(units) == 1:
+        return units[0], text
+    unit, colon, line = text.partition(":")
+    if not colon:
+        raise Problem("", "--send", f"{text!r}: a cell has several units, write UNIT:LINE")
+    if unit not in units:
+        raise Problem("", "--send", str(unknown("unit", unit, units)))
+    if cell.wiring.line_of[cell.unit(unit)] < 0:
+        raise Problem("", "--send", f"{unit} is on no line")
+    return unit, line
+
+
+def _exchange(cell: "Cell", unit: str, text: str) -> list[Exchange]:
+    """Send a line and let the cell go on until it is answered and the line is quiet, or nothing is left to do."""
+    line = cell.lines[cell.wiring.line_of[cell.unit(unit)]]
+    line.take()
+    cell.type(unit, text)
+    for _ in range(MOST_INSTANTS):
+        heard = bytes(h.char.value for h in line.heard)
+        if heard.endswith(b"\r") and line.deadline > cell.now and (cell.next_event() or 0) != cell.now:
+            break
+        if cell.step() is None:
+            break
+    answers = bytes(h.char.value for h in line.take()).decode("ascii", "replace")
+    return [Exchange(unit, text, [answer for answer in answers.split("\r") if answer])]
+
+
+def _run_on(cell: "Cell", until: "Ns | None") -> str:
+    """Run to `until`, or until nothing is left to do: how it ended, in a word: time, idle, endless."""
+    if until is not None:
+        cell.run_to(max(until, cell.now))
+        return "time"
+    for _ in range(MOST_INSTANTS):
+        if cell.step() is None:
+            return "idle"
+    return "endless"
+
+
+def _write(kind: str, path: Path, cell: "Cell", title: str) -> None:
+    raise NotImplementedError
+
+
+def _result(cell: "Cell", ended: str, exchanges: list[Exchange]) -> dict[str, object]:
+    units = {name: unit.status(cell.now)._asdict() for name, unit in cell.controllers().items()}
+    result: dict[str, object] = {"time_ns": cell.now, "ended": ended, "units": units}
+    if exchanges:
+        result["exchanges"] = [exchange._asdict() for exchange in exchanges]
+    return result
+
+
+def _print_result(cell: "Cell", ended: str, exchanges: list[Exchange], written: list[Path]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from detent.ticks import show_duration
+
+    console = Console(highlight=False)
+    several = len(cell.controllers()) > 1
+    for exchange in exchanges:
+        console.print(f"> {exchange.unit + ': ' if several else ''}{exchange.sent}", markup=False)
+        for answer in exchange.answers:
+            console.print(f"< {answer}", markup=False)
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for column in ("unit", "model", "position", "pulses", "state"):
+        table.add_column(column, justify="right" if column in ("position", "pulses") else "left")
+    moving = []
+    for name, unit in cell.controllers().items():
+        status = unit.status(cell.now)
+        table.add_row(name, unit.model, str(status.position), str(status.pulses), status.state)
+        if status.state in ("running", "homing"):
+            moving.append(name)
+    console.print(table)
+    time = show_duration(cell.now)
+    match ended:
+        case "idle" if moving:
+            print(f"Nothing more will happen by itself after {time}; {', '.join(moving)} still at work.")
+        case "idle":
+            print(f"Nothing left to do after {time} of virtual time.")
+        case "endless":
+            print(f"Stopped at {time}: after {MOST_INSTANTS} events the program looks endless.", file=sys.stderr)
+            print("Say how long to run it: --for TIME, like --for 60", file=sys.stderr)
+        case _:
+            print(f"Ran for {time} of virtual time.")
+    for path in written:
+        print(f"Wrote {path}")

@@ -1,0 +1,178 @@
+"""The models by name: what they are, their pins, straps and options, and how to make one.
+
+The command line, the cell files, the help and the reference pages read `MODELS`.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import Any, NamedTuple, Protocol
+
+from detent.assembler import Language
+from detent.controllers.device import Controller
+from detent.controllers.gsc200 import commands as gsc200_commands
+from detent.controllers.gsc200 import pins as gsc200_pins
+from detent.controllers.gsc200 import program as gsc200_program
+from detent.controllers.gsc200.firmware import GsC200
+from detent.pins import Level, Pin, PinKind
+from detent.ticks import US, parse_duration
+
+
+class CatalogueError(ValueError):
+    """A model, strap or option that does not exist, or a value it does not take; the text has the remedy."""
+
+
+class Option(NamedTuple):
+    """A choice that no pin of the real thing makes: how it is written, what it means, what it is by default."""
+
+    name: str
+    keyword: str  # of the model's `make`
+    read: Callable[[str], Any]  # raises ValueError
+    takes: str
+    default: str
+    help: str
+
+
+class Model(NamedTuple):
+    """One model of the catalogue."""
+
+    name: str
+    title: str
+    manual: str
+    pins: tuple[Pin, ...]
+    straps: Mapping[str, Level]
+    options: tuple[Option, ...]
+    make: Callable[..., Controller]
+    language: Callable[[], Language[Any]]
+    commands: Callable[[], Sequence[gsc200_commands.Row]]
+    strap_line: Callable[[Sequence[tuple[str, Mapping[str, Level]]]], list[dict[str, Level]]]
+
+
+def unknown(kind: str, name: str, known: Sequence[str]) -> CatalogueError:
+    """The error for a name that is not among the known ones, with the likeliest of them."""
+    near = get_close_matches(name, known, 1, 0.5) or [k for k in known if k.lower() == name.lower()]
+    hint = f"did you mean {near[0]}? " if near else ""
+    return CatalogueError(f"no {kind} {name!r}; {hint}there are: {', '.join(known)}")
+
+
+def model(name: str) -> Model:
+    """The model of that name. Raises CatalogueError."""
+    try:
+        return MODELS[name]
+    except KeyError:
+        raise unknown("model", name, tuple(MODELS)) from None
+
+
+def language(name: str) -> Language[Any]:
+    """The language of a model's programs. Raises CatalogueError."""
+    return model(name).language()
+
+
+class Configurable(Protocol):
+    """Whatever has straps and options: a model, or a part of a cell that is no controller."""
+
+    @property
+    def name(self) -> str:
+        """Its model name."""
+
+    @property
+    def pins(self) -> tuple[Pin, ...]:
+        """Its pin table."""
+
+    @property
+    def straps(self) -> Mapping[str, Level]:
+        """Its straps and their defaults."""
+
+    @property
+    def options(self) -> tuple[Option, ...]:
+        """Its options."""
+
+
+def strap_level(found: Configurable, pin: str, value: object) -> Level:
+    """The level that `value` (0, 1, low, high, open) gives to a strap. Raises CatalogueError."""
+    if pin not in found.straps:
+        raise unknown(f"strap of the {found.name}", pin, tuple(found.straps))
+    text = str(value).strip().lower()
+    levels = {"0": 0, "low": 0, "1": 1, "high": 1}
+    if text == "open":
+        return found.straps[pin] if _pin(found, pin).kind is PinKind.SERIAL else _pin(found, pin).rest
+    if isinstance(value, bool) or text not in levels:
+        raise CatalogueError(f"strap {pin} cannot be {value!r}; it takes low (0), high (1) or open")
+    return levels[text]
+
+
+def option_values(found: Configurable, chosen: Mapping[str, object]) -> dict[str, Any]:
+    """Keyword arguments for `make` from options as they are written. Raises CatalogueError."""
+    known = {option.name: option for option in found.options}
+    values = {}
+    for name, written in chosen.items():
+        if name not in known:
+            raise unknown(f"option of the {found.name}", name, tuple(known))
+        option = known[name]
+        try:
+            values[option.keyword] = option.read(str(written))
+        except ValueError:
+            raise CatalogueError(f"option {name} cannot be {written!r}; it takes {option.takes}") from None
+    return values
+
+
+def _pin(found: Configurable, name: str) -> Pin:
+    return next(pin for pin in found.pins if pin.name == name)
+
+
+def _instruction_time(text: str) -> int:
+    duration = parse_duration(text)
+    if duration < US:
+        raise ValueError("too short")
+    return duration
+
+
+def _revision(text: str) -> tuple[int, int]:
+    major, _, minor = text.strip().removeprefix("V").removeprefix("v").partition(".")
+    return int(major), int(minor)
+
+
+def _choice(**meanings: Any) -> Callable[[str], Any]:
+    def read(text: str) -> Any:
+        try:
+            return meanings[text.strip().lower()]
+        except KeyError:
+            raise ValueError(text) from None
+
+    return read
+
+
+_GSC200_OPTIONS = (
+    Option(
+        "instruction_time", "instruction_time", _instruction_time, "a duration of at least 1 us", "1 ms",
+        "time that each instruction takes beside what it does",
+    ),
+    Option(
+        "clock", "separate_clocks", _choice(direction=False, separate=True), "direction or separate", "direction",
+        "step output: CLOCK with DIR, or besides them a clock for each direction (CW, CCW; figure 10)",
+    ),
+)  # fmt: skip
+_GSC200_REVISION = Option(
+    "revision", "revision", _revision, "a revision like 2.1 or 2.2", "2.2",
+    "firmware revision: up to 2.1 the checksum is not ORed with 10h",
+)  # fmt: skip
+
+
+def _gsc200(name: str, options: tuple[Option, ...]) -> Model:
+    return Model(
+        name,
+        f"SGS-THOMSON {name.upper()} intelligent stepper motor controller",
+        "docs/controllers/gsc200.md",
+        gsc200_pins.PINS,
+        gsc200_pins.DEFAULT_STRAPS,
+        options,
+        lambda straps, **keywords: GsC200(name, straps, **keywords),
+        lambda: gsc200_program.language(name),
+        lambda: gsc200_commands.rows(name),
+        gsc200_pins.strap_line,
+    )
+
+
+MODELS: dict[str, Model] = {
+    "gs-c200": _gsc200("gs-c200", (*_GSC200_OPTIONS, _GSC200_REVISION)),
+    "gs-c200s": _gsc200("gs-c200s", _GSC200_OPTIONS),
+}

@@ -1,0 +1,126 @@
+"""The contract between a device and the cell it sits in.
+
+A device is told the time. It owns no clock, thread, socket or file; it is told what reaches its pins
+and its serial port and when, and it is asked what it did. Two laws hold for every device and are tested
+on all of them: its output depends neither on how the characters of one instant are sliced into calls of
+`receive`, nor on how the time between two events is sliced into calls of `advance`.
+
+Order within one instant: a pulse due at t is sent before anything else at t; the device's own deadlines
+come before pins, pins before characters. `receive` and `set_pin` therefore first advance to `now`.
+
+A device can be copied at any moment (`copy.deepcopy`) and both copies go on identically. What never
+changes (tables, trains, options) returns itself when copied.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, TypeAlias
+
+from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.pins import Level, Pin, PinSet, PulseOutput
+from detent.ticks import Ns
+from detent.uart import Char, Format, Sent
+
+
+class Executing(NamedTuple):
+    """The program reached the instruction at byte `address`, printed as it is listed."""
+
+    at: Ns
+    address: int
+    instruction: str
+
+
+class Refused(NamedTuple):
+    """A frame or command was turned down: what it was, and why, in words."""
+
+    at: Ns
+    frame: str
+    reason: str
+
+
+class StoreImage(NamedTuple):
+    """Non-volatile memory is to be written. The owner answers with `stored` in the same instant."""
+
+    at: Ns
+    image: bytes
+
+
+class Powered(NamedTuple):
+    """The supply was switched. Without power every output lets go."""
+
+    at: Ns
+    on: bool
+
+
+Output: TypeAlias = (
+    Sent | PinSet | MotionStarted | MotionCut | MotionEnded | Executing | Refused | StoreImage | Powered
+)
+
+
+class Status(NamedTuple):
+    """What a glance at a device tells: the axis position by its own counter, pulses sent, a word of state."""
+
+    position: int
+    pulses: int
+    state: str
+
+
+class Device(Protocol):
+    """Anything that sits in a cell."""
+
+    pins: Sequence[Pin]
+
+    def power(self, on: bool, now: Ns) -> None:
+        """Switch the supply. Everything volatile is lost; straps are read at the next power-on."""
+
+    def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
+        """Characters whose stop bits end at `now` on the serial input `port`."""
+
+    def set_pin(self, pin: str, level: Level, now: Ns) -> None:
+        """An input pin takes a level."""
+
+    def stored(self, ok: bool, now: Ns) -> None:
+        """The answer to `StoreImage`, given in the same instant."""
+
+    def next_deadline(self) -> Ns | None:
+        """When the device wants to be advanced next, if nothing else happens."""
+
+    def advance(self, now: Ns) -> None:
+        """Do everything that is due up to and including `now`, which is never beyond `next_deadline`."""
+
+    def drain(self) -> list[Output]:
+        """What the device did since the last call, in order."""
+
+    def watch(self, pin: str) -> None:
+        """A wire leads from this pulse output to another device: report its every pulse as `PinSet`."""
+
+
+class Controller(Device, Protocol):
+    """A device that moves an axis and may hold a program."""
+
+    @property
+    def model(self) -> str:
+        """Its name in the catalogue."""
+
+    @property
+    def pulse_output(self) -> PulseOutput:
+        """The pins that carry its step pulses."""
+
+    @property
+    def line_format(self) -> Format:
+        """How characters look on its serial line."""
+
+    def status(self, now: Ns) -> Status:
+        """Where it is and what it does, at `now`."""
+
+    def frame(self, text: str) -> bytes:
+        """The bytes a host sends for the command line `text`: address, checksum and terminator added."""
+
+    def restore(self, image: bytes) -> None:
+        """Put `image` into non-volatile memory, before the first power-on. Raises `detent.assembler.ImageError`."""
+
+    def load(self, image: bytes, now: Ns) -> None:
+        """Put a program image into program memory, as if a host had sent it. Raises `detent.assembler.ImageError`."""
+
+    def start(self, now: Ns) -> None:
+        """Start the program in memory, as if a host had asked for it."""
+

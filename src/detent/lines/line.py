@@ -1,0 +1,99 @@
+"""A line from a host to its units: every unit hears the host, the host hears every unit.
+
+With one unit that is a point-to-point connection, with several a multipoint one. Characters are delivered at
+the end of their last stop bit. The units' outputs share a wire on which a 0 wins: characters of two units that
+coincide in time merge bit by bit, and ones that only overlap are damaged.
+"""
+
+from typing import NamedTuple
+
+from detent.ticks import NEVER, Ns
+from detent.uart import Char, Format, Sent, Transmitter
+
+HOST_PORT = "HOST"
+
+
+class Heard(NamedTuple):
+    """A character that has reached the host."""
+
+    at: Ns
+    char: Char
+
+
+class _Talking(NamedTuple):
+    """A character of a unit that is on the wire, as it will arrive."""
+
+    began: Ns
+    done: Ns
+    char: Char
+
+
+class Line:
+    """One host, some units, one character format. With `timed` false, characters take no time."""
+
+    __slots__ = ("_from_units", "_host", "_on_wire", "deadline", "format", "heard")
+
+    def __init__(self, form: Format, *, timed: bool = True) -> None:
+        self.format = form
+        self.deadline: Ns = NEVER
+        self.heard: list[Heard] = []  # what reached the host and was not taken yet
+        self._on_wire: list[Sent] = []  # from the host; also the transmitter's outbox
+        self._host = Transmitter(HOST_PORT, form, self._on_wire, timed=timed)
+        self._from_units: list[_Talking] = []
+
+    def send(self, data: bytes, now: Ns) -> None:
+        """The host sends `data`, behind what it is still sending. A byte too wide for the line arrives damaged."""
+        self._host.send(data, now)
+        self._plan()
+
+    @property
+    def host_busy_until(self) -> Ns:
+        """When the last stop bit of what the host has sent so far ends."""
+        return self._host.busy_until
+
+    def from_unit(self, sent: Sent) -> None:
+        """A unit begins a character."""
+        began, done, char = sent.at, sent.done, sent.char
+        for index, other in enumerate(self._from_units):
+            if (other.began, other.done) == (began, done) and began < done:
+                merged = Char(other.char.value & char.value, other.char.parity_ok, other.char.framing_ok)
+                self._from_units[index] = other._replace(char=merged)
+                return
+            if other.done > began:
+                self._from_units[index] = other._replace(char=other.char._replace(framing_ok=False))
+                char = char._replace(framing_ok=False)
+        self._from_units.append(_Talking(began, done, char))
+        self._plan()
+
+    def advance(self, now: Ns) -> list[Sent]:
+        """Deliver what is due: to the host into `heard`; returned is what reaches the units at `now`."""
+        self._host.advance(now)
+        due = [talking for talking in self._from_units if talking.done <= now]
+        if due:
+            self._from_units = [talking for talking in self._from_units if talking.done > now]
+            self.heard += [Heard(talking.done, talking.char) for talking in due]
+        arrived = [sent for sent in self._on_wire if sent.done <= now]
+        if arrived:
+            del self._on_wire[: len(arrived)]
+            limit = 1 << self.format.data_bits
+            arrived = [
+                sent if sent.char.value < limit else sent._replace(char=Char(sent.char.value % limit, parity_ok=False))
+                for sent in arrived
+            ]
+        self._plan()
+        return arrived
+
+    def take(self) -> list[Heard]:
+        """What has reached the host since the last call."""
+        heard = self.heard
+        self.heard = []
+        return heard
+
+    def _plan(self) -> None:
+        deadline = self._host.deadline
+        if self._on_wire and self._on_wire[0].done < deadline:
+            deadline = self._on_wire[0].done
+        for talking in self._from_units:
+            if talking.done < deadline:
+                deadline = talking.done
+        self.deadline = deadline

@@ -1,0 +1,90 @@
+"""NumPy archives (NPZ): pulse times, positions and pin levels, for `numpy.load`.
+
+| key | dtype | what |
+|---|---|---|
+| `UNIT/step_times` | int64 | ns at which each step pulse begins |
+| `UNIT/step_directions` | int8 | +1 or -1 |
+| `UNIT/positions` | int64 | the commanded position behind each pulse, in steps |
+| `UNIT/PIN/times`, `UNIT/PIN/levels` | int64, int8 | changes: from that time on the pin is 0, 1, or -1 (no supply) |
+| `meta` | str | JSON: units, their pins and positions at 0, the end in ns, and what the caller adds |
+
+The first entry of a pin is its level before 0, at time -1. A step clock whose pulses no wire carries to another
+device has no entry of its own: `step_times` are its pulses, and `meta` tells their width and level. The same
+signals give the same bytes.
+"""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import IO, Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+import numpy as np
+import numpy.typing as npt
+
+from detent.cell.recording import Span
+from detent.outputs.files import open_whole
+from detent.outputs.signals import Signals, UnitSignals
+from detent.outputs.waves import UNKNOWN
+
+BLOCK = 1 << 18  # pulses made at a time
+
+
+def write(path: Path, signals: Signals, meta: Mapping[str, Any] | None = None) -> None:
+    """Write the file, whole or not at all. `meta` must be fit for JSON. OSError if it cannot be written."""
+    about = {"until_ns": signals.until, "units": {unit.name: _about(unit) for unit in signals.units}, **(meta or {})}
+    text = np.array(json.dumps(about, sort_keys=True))
+    with open_whole(path) as file, ZipFile(file, "w", ZIP_DEFLATED) as archive:
+        _put(archive, "meta", text.dtype, (), [text])
+        for unit in signals.units:
+            _put_unit(archive, unit)
+
+
+def _about(unit: UnitSignals) -> dict[str, Any]:
+    output = unit.view.pulse_output
+    return {
+        "pins": list(unit.pins),
+        "position_at_0": unit.start,
+        "pulse_output": None if output is None else output._asdict(),
+    }
+
+
+def _put_unit(archive: ZipFile, unit: UnitSignals) -> None:
+    name, count, int64 = unit.name, (unit.pulse_count,), np.dtype(np.int64)
+    _put(archive, f"{name}/step_times", int64, count, (span.train.times(a, b) for span, a, b in _blocks(unit.spans)))
+    signs = (np.full(b - a + 1, span.direction, np.int8) for span, a, b in _blocks(unit.spans))
+    _put(archive, f"{name}/step_directions", np.dtype(np.int8), count, signs)
+    places = (span.shaft + span.direction * np.arange(a, b + 1, dtype=np.int64) for span, a, b in _blocks(unit.spans))
+    _put(archive, f"{name}/positions", int64, count, places)
+    for pin in unit.pins:
+        if pin not in unit.unlogged:
+            wave = unit.wave(pin)
+            times = np.concatenate((np.array([-1], np.int64), wave.times))
+            levels = np.concatenate(([unit.level_before(pin, 0)], wave.levels)).astype(np.int8)
+            levels[levels == UNKNOWN] = -1
+            _put(archive, f"{name}/{pin}/times", times.dtype, times.shape, [times])
+            _put(archive, f"{name}/{pin}/levels", levels.dtype, levels.shape, [levels])
+
+
+def _blocks(spans: Iterable[Span]) -> Iterator[tuple[Span, int, int]]:
+    """Each span with the first and last number of some of its pulses, in order."""
+    for span in spans:
+        for first in range(span.first, span.last + 1, BLOCK):
+            yield span, first, min(first + BLOCK - 1, span.last)
+
+
+def _put(
+    archive: ZipFile, key: str, dtype: np.dtype[Any], shape: tuple[int, ...], parts: Iterable[npt.NDArray[Any]]
+) -> None:
+    """Add one array in pieces, as `numpy.savez_compressed` would, but always with the same date."""
+    member = ZipInfo(f"{key}.npy", (1980, 1, 1, 0, 0, 0))
+    member.compress_type = ZIP_DEFLATED
+    with archive.open(member, "w", force_zip64=True) as file:
+        _put_header(file, dtype, shape)
+        for part in parts:
+            file.write(part.tobytes())
+
+
+def _put_header(file: IO[bytes], dtype: np.dtype[Any], shape: tuple[int, ...]) -> None:
+    header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(file, header)

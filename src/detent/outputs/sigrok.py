@@ -1,0 +1,161 @@
+"""Session files of sigrok (`.sr`): what PulseView and sigrok-cli read, with all their decoders.
+
+A sample holds the levels of all channels at one instant. A level that lasts less than the time between two
+samples is stretched to one sample, and what follows at once is then late by as much: no edge is lost. An
+output without supply is 0.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+import numpy as np
+
+from detent.outputs.files import open_whole
+from detent.outputs.signals import Signals, UnitSignals
+from detent.outputs.waves import Levels
+from detent.pulses.segment import Int64Array
+from detent.ticks import SECOND, Ns
+
+SAMPLERATE = 1_000_000  # a step pulse of 1.7 us takes two samples
+CHUNK = 1 << 19  # most samples in one member of the archive
+LONGEST: Ns = 10 * SECOND  # a member covers no longer time, so that its pulses fit memory
+MOST_SAMPLES = 1 << 34  # some minutes of work; an archive nobody opens
+MOST_LATE = 64  # samples by which an edge may be stretched away from its time
+
+
+class Channel(NamedTuple):
+    """One pin of one unit."""
+
+    unit: UnitSignals
+    pin: str
+
+    @property
+    def name(self) -> str:
+        """The name sigrok shows: UNIT.PIN."""
+        return f"{self.unit.name}.{self.pin}"
+
+
+def channels(signals: Signals, names: Sequence[str] | None = None) -> list[Channel]:
+    """The channels `names` (UNIT.PIN), in that order; None: every pin drawn. KeyError for a name that is none."""
+    every = {one.name: one for one in (Channel(unit, pin) for unit in signals.units for pin in unit.pins)}
+    if names is None:
+        return list(every.values())
+    for name in names:
+        if name not in every:
+            raise KeyError(f"no channel {name!r}: there are {', '.join(every)}")
+    return [every[name] for name in names]
+
+
+def write(
+    path: Path, signals: Signals, *, samplerate: int = SAMPLERATE, names: Sequence[str] | None = None
+) -> None:
+    """Write the file, whole or not at all.
+
+    `samplerate` is in samples a second, `names` chooses channels. ValueError for a samplerate that is too low
+    for the edges of a channel, or too high for a run of this length; OSError if the file cannot be written.
+    """
+    if samplerate < 1:
+        raise ValueError(f"a samplerate is at least 1 sample a second, not {samplerate}")
+    samples = signals.until * samplerate // SECOND + 1
+    if samples > MOST_SAMPLES:
+        fits = (MOST_SAMPLES - 1) * SECOND // signals.until
+        raise ValueError(
+            f"{signals.until / SECOND:g} s at {samplerate} samples/s are {samples} samples, more than {MOST_SAMPLES}: "
+            f"take a samplerate of at most {fits}, a shorter run, or a VCD, which has no samplerate"
+        )
+    chosen = channels(signals, names)
+    with open_whole(path) as file, ZipFile(file, "w", ZIP_DEFLATED) as archive:
+        _put(archive, "version", b"2")
+        _put(archive, "metadata", _metadata(chosen, samplerate))
+        for number, chunk in enumerate(_chunks(signals, chosen, samplerate, samples), 1):
+            _put(archive, f"logic-1-{number}", chunk)
+
+
+def _put(archive: ZipFile, name: str, data: bytes) -> None:
+    member = ZipInfo(name, (1980, 1, 1, 0, 0, 0))  # always this date: the same run gives the same file
+    member.compress_type = ZIP_DEFLATED
+    archive.writestr(member, data, compresslevel=1)
+
+
+def _metadata(chosen: Sequence[Channel], samplerate: int) -> bytes:
+    lines = [
+        "[global]", "sigrok version=0.5.2", "", "[device 1]", "capturefile=logic-1", f"total probes={len(chosen)}",
+        f"samplerate={samplerate} Hz", "total analog=0",
+        *(f"probe{number}={channel.name}" for number, channel in enumerate(chosen, 1)),
+        f"unitsize={_unitsize(chosen)}", "",
+    ]  # fmt: skip
+    return "\n".join(lines).encode()
+
+
+def _unitsize(chosen: Sequence[Channel]) -> int:
+    return max(-(-len(chosen) // 8), 1)
+
+
+def _chunks(signals: Signals, chosen: Sequence[Channel], samplerate: int, samples: int) -> Iterator[bytes]:
+    """The samples of all channels, a chunk at a time."""
+    samplers = [_Sampler(channel, samplerate) for channel in chosen]
+    size = min(CHUNK, max(LONGEST * samplerate // SECOND, 1))
+    for first in range(0, samples, size):
+        count = min(size, samples - first)
+        rows = np.zeros((count, _unitsize(chosen)), np.uint8)
+        for number, sampler in enumerate(samplers):
+            levels = sampler.levels(first, count)
+            if len(levels) > 1 or levels[0]:
+                rows[:, number // 8] |= levels << (number % 8)
+        yield rows.tobytes()
+
+
+class _Sampler:
+    """One channel, sampled from the beginning on, chunk after chunk."""
+
+    def __init__(self, channel: Channel, samplerate: int) -> None:
+        self._unit, self._channel, self._samplerate = channel.unit, channel, samplerate
+        self._level = channel.unit.level_before(channel.pin, 0)
+        self._free = 0  # the earliest sample at which the next edge can be shown
+        self._late: tuple[Int64Array, Levels] = (np.empty(0, np.int64), np.empty(0, np.uint8))  # for the next chunk
+
+    def levels(self, first: int, count: int) -> Levels:
+        """The levels of the samples first .. first + count - 1; a single one if that does not change."""
+        rate = self._samplerate
+        fresh = self._unit.wave(self._channel.pin, _first_ns(first, rate), _first_ns(first + count, rate))
+        at = np.concatenate((self._late[0], self._edges(fresh.times)))
+        to = np.concatenate((self._late[1], fresh.levels))
+        inside = int(np.searchsorted(at, first + count))
+        self._late = at[inside:], to[inside:]
+        at, to = at[:inside], to[:inside]
+        before = self._level
+        if not inside:
+            return np.array([before == 1], np.uint8)
+        self._level = int(to[-1])
+        lengths = np.diff(at, prepend=first, append=first + count)
+        return np.repeat(np.concatenate(([before], to)) == 1, lengths).view(np.uint8)
+
+    def _edges(self, times: Int64Array) -> Int64Array:
+        """The sample of each change: the first one at or after it, and behind that of the change before."""
+        if not len(times):
+            return times
+        seconds, rest = np.divmod(times, SECOND)
+        wanted = seconds * self._samplerate - (-rest * self._samplerate // SECOND)
+        index = np.arange(len(wanted))
+        at = np.maximum(np.maximum.accumulate(wanted - index), self._free) + index
+        self._free = int(at[-1]) + 1
+        late = at - wanted
+        if late.max() > MOST_LATE:
+            raise self._too_slow(times)
+        return at
+
+    def _too_slow(self, times: Int64Array) -> ValueError:
+        run = min(MOST_LATE, len(times) - 1)
+        shortest = max(int((times[run:] - times[:-run]).min()), 1) if run else 1
+        needed = max(-(-run * SECOND // shortest), self._samplerate + 1)
+        return ValueError(
+            f"{self._samplerate} samples/s are too few for the edges of {self._channel.name}: take at least {needed}, "
+            "leave the channel out, or write a VCD, which has no samplerate"
+        )
+
+
+def _first_ns(sample: int, samplerate: int) -> Ns:
+    """The first ns that is shown by this sample and not by the one before it."""
+    return (sample - 1) * SECOND // samplerate + 1

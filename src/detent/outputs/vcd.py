@@ -1,0 +1,189 @@
+"""Value change dumps (IEEE 1364): what GTKWave, Surfer and sigrok read.
+
+Timescale 1 ns, one scope a unit, wires named as its pins, and the commanded `position` as a signed integer.
+An output without supply is x. The same signals give the same bytes.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from detent.outputs.files import open_whole
+from detent.outputs.signals import Signals, UnitSignals
+from detent.outputs.waves import BEFORE_ALL
+from detent.pulses.segment import Int64Array
+from detent.ticks import Ns
+
+Text = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.bool_]
+
+_LEVELS = np.frombuffer(b"01x", np.uint8)
+_FIRST, _LAST = 33, 126  # identifiers are made of these printable characters
+_GROUPS = np.array([list(b"%04d" % n) for n in range(10_000)], np.uint8)  # four decimal digits at a time
+
+
+class _Rows(NamedTuple):
+    """Changes in any order: when, the place in the instant, the number of the variable, its new value."""
+
+    times: Int64Array
+    order: Int64Array
+    variables: Int64Array
+    values: Int64Array
+
+
+def write(path: Path, signals: Signals) -> None:
+    """Write the file, whole or not at all. OSError if it cannot be written."""
+    with open_whole(path) as file:
+        for piece in pieces(signals):
+            file.write(piece)
+
+
+def pieces(signals: Signals) -> Iterator[bytes]:
+    """The file in pieces, in order."""
+    dump = _Dump(signals)
+    yield dump.header()
+    now = 0
+    for begin, end in signals.windows():
+        rows = dump.rows(begin, end)
+        if len(rows.times):
+            yield dump.text(rows, now)
+            now = int(rows.times.max())
+    if now < signals.until:
+        yield b"#%d\n" % signals.until
+
+
+class _Dump:
+    """The variables of one file."""
+
+    def __init__(self, signals: Signals) -> None:
+        self._signals = signals
+        count = sum(len(unit.pins) + 1 for unit in signals.units)
+        self._identifiers = [_identifier(number) for number in range(count)]
+        self._id_width = max((len(identifier) for identifier in self._identifiers), default=1)
+        padded = b"".join(identifier.ljust(self._id_width, b"\0") for identifier in self._identifiers)
+        self._id_text = np.frombuffer(padded, np.uint8).reshape(-1, self._id_width)
+        self._time_width = len(str(signals.until))
+        self._bits = 32 if all(_fits(unit, 32) for unit in signals.units) else 64
+
+    def header(self) -> bytes:
+        """Everything up to the first change after 0, the levels before it included."""
+        lines = ["$comment Made by detent. position: the commanded one, in steps. $end", "$timescale 1 ns $end"]
+        initial = ["#0", "$dumpvars"]
+        identifiers = (identifier.decode() for identifier in self._identifiers)
+        for unit in self._signals.units:
+            lines.append(f"$scope module {_word(unit.name)} $end")
+            for pin in unit.pins:
+                identifier = next(identifiers)
+                lines.append(f"$var wire 1 {identifier} {_word(pin)} $end")
+                initial.append(f"{'01x'[unit.level_before(pin, 0)]}{identifier}")
+            identifier = next(identifiers)
+            lines += [f"$var integer {self._bits} {identifier} position $end", "$upscope $end"]
+            initial.append(f"b{unit.start % (1 << self._bits):b} {identifier}")
+        return "\n".join([*lines, "$enddefinitions $end", *initial, "$end", ""]).encode()
+
+    def rows(self, begin: Ns, end: Ns) -> _Rows:
+        """All changes of a window, in order."""
+        columns: list[_Rows] = []
+        variable = 0
+        for unit in self._signals.units:
+            pulses = unit.pulses_for(begin, end)
+            for pin in unit.pins:
+                one = unit.wave(pin, begin, end, pulses)
+                if len(one.times):
+                    same = np.full(len(one.times), variable, np.int64)
+                    columns.append(_Rows(one.times, one.order, same, one.levels.astype(np.int64)))
+                variable += 1
+            times = pulses.times
+            inside = slice(int(np.searchsorted(times, begin)), None)
+            first = np.full(len(times[inside]), BEFORE_ALL, np.int64)
+            same = np.full(len(first), variable, np.int64)
+            columns.append(_Rows(times[inside], first, same, pulses.positions[inside]))
+            variable += 1
+        rows = _Rows(*(np.concatenate(parts) for parts in zip(*columns, strict=True))) if columns else _Rows(*[_NONE] * 4)
+        index = np.lexsort((rows.order, rows.times))
+        return _Rows(*(column[index] for column in rows))
+
+    def text(self, rows: _Rows, now: Ns) -> bytes:
+        """The changes as text; the last `#` written was `now`.
+
+        Every row is laid out in columns of the same width, `#time`, newline, value, identifier, newline;
+        what a row does not need of them is then left out.
+        """
+        new = np.diff(rows.times, prepend=now) != 0
+        is_position = self._is_position()[rows.variables]
+        is_level = ~is_position
+        parts: list[tuple[Text, Mask]] = [_decimal(rows.times, self._time_width, new)]
+        parts.append((np.where(is_level, _LEVELS[np.where(is_level, rows.values, 0)], ord("b"))[:, None], _all(rows)))
+        if is_position.any():
+            parts.append(_binary(np.where(is_position, rows.values, 0), self._bits, is_position))
+        identifiers = self._id_text[rows.variables]
+        parts += [(identifiers, identifiers != 0), (np.full((len(new), 1), 10, np.uint8), _all(rows))]
+        text = np.concatenate([text for text, _ in parts], axis=1)
+        mask = np.concatenate([mask for _, mask in parts], axis=1)
+        return text[mask].tobytes()
+
+    def _is_position(self) -> Mask:
+        return np.array([last for unit in self._signals.units for last in [*[False] * len(unit.pins), True]], np.bool_)
+
+
+_NONE = np.empty(0, np.int64)
+
+
+def _all(rows: _Rows) -> Mask:
+    return np.ones((len(rows.times), 1), np.bool_)
+
+
+def _decimal(times: Int64Array, width: int, wanted: Mask) -> tuple[Text, Mask]:
+    """Rows of '#', the time, newline; a row that is not wanted has an empty mask."""
+    text = np.empty((len(times), width + 2), np.uint8)
+    mask = np.repeat(wanted[:, None], width + 2, axis=1)
+    text[:, 0], text[:, -1] = ord("#"), ord("\n")
+    rest, right = times, width + 1
+    while right > 1:
+        rest, group = np.divmod(rest, 10_000)
+        left = max(right - 4, 1)
+        text[:, left:right] = _GROUPS[group, 4 - (right - left) :]
+        right = left
+    for place in range(1, width):
+        mask[:, width - place] &= times >= 10**place
+    return text, mask
+
+
+def _binary(values: Int64Array, bits: int, wanted: Mask) -> tuple[Text, Mask]:
+    """Rows of two's complement digits and a blank, without leading zeros."""
+    low, high = int(values.min()), int(values.max())
+    width = bits if low < 0 else max(high.bit_length(), 1)
+    shifted = values[:, None] >> np.arange(width - 1, -1, -1)
+    text = np.empty((len(values), width + 1), np.uint8)
+    np.bitwise_and(shifted, 1, out=text[:, :width], casting="unsafe")
+    text[:, :width] += ord("0")
+    text[:, -1] = ord(" ")
+    mask = np.empty(text.shape, np.bool_)
+    np.not_equal(shifted, 0, out=mask[:, :width])
+    mask[:, -2:] = True
+    mask &= wanted[:, None]
+    return text, mask
+
+
+def _fits(unit: UnitSignals, bits: int) -> bool:
+    """Whether all positions are signed integers of so many bits."""
+    ends = [unit.start, *(span.shaft + span.direction * span.last for span in unit.spans)]
+    return all(-(1 << bits - 1) <= end < 1 << bits - 1 for end in ends)
+
+
+def _identifier(number: int) -> bytes:
+    """The short name of a variable in the file."""
+    size = _LAST - _FIRST + 1
+    name = bytes([_FIRST + number % size])
+    while number >= size:
+        number = number // size - 1
+        name += bytes([_FIRST + number % size])
+    return name
+
+
+def _word(name: str) -> str:
+    """A name without white space, which ends a name in this format."""
+    return "_".join(name.split())

@@ -1,0 +1,101 @@
+"""What trains that differ only in their start share: segments, running sums, and arrays kept for next time."""
+
+from bisect import bisect_left
+from typing import TypeAlias
+
+import numpy as np
+
+from detent.pulses.accelerating import Accelerating
+from detent.pulses.batch import Columns
+from detent.pulses.segment import Int64Array
+from detent.pulses.table import Table
+from detent.pulses.ticked import Ticked
+from detent.pulses.uniform import Uniform
+from detent.ticks import FIXED_BITS, ONE_NS, Fixed
+
+AnySegment: TypeAlias = Uniform | Accelerating | Table | Ticked
+
+SMALL = 1 << 13  # pulses of a shape whose times are kept
+SHORT = 1 << 10  # pulses a segment, on average, below which columns are quicker than segment after segment
+BLOCK = 1 << 14  # pulses of such segments at a time
+
+
+class Shape:
+    """The segments of a train and their running sums. ValueError for segments that overlap or follow an endless one."""
+
+    __slots__ = ("_columns", "_kept", "before", "begins", "ends", "lasts", "segments", "steps", "through")
+
+    def __init__(self, segments: tuple[AnySegment, ...]) -> None:
+        self.segments = segments
+        self.steps: int | None = 0
+        self.before: list[int] = []  # pulses before each segment
+        self.begins: list[Fixed] = []
+        # of each segment but an endless one:
+        self.through: list[int] = []  # pulses up to its end
+        self.lasts: list[Fixed] = []  # the instant of the last of these
+        self.ends: list[Fixed] = []
+        self._kept: tuple[Fixed, Int64Array] | None = None
+        self._columns: tuple[Fixed, Columns] | None = None
+        pulses, last, end = 0, 0, 0
+        for number, segment in enumerate(segments):
+            if self.steps is None:
+                raise ValueError(f"segment {number - 1} never ends: only the last segment may be open-ended")
+            begin, its_end, steps = segment.begin, segment.end, segment.steps
+            if begin < end:
+                raise ValueError(f"segment {number} begins {end - begin} units of 2**-60 ns before the end of the "
+                                 "one before it (or of the train's start)")  # fmt: skip
+            self.before.append(pulses)
+            self.begins.append(begin)
+            if steps is None or its_end is None:
+                self.steps = None
+                continue
+            if steps:
+                last = segment.fixed(steps) if isinstance(segment, Ticked) else its_end
+            pulses, end = pulses + steps, its_end
+            self.steps = pulses
+            self.through.append(pulses)
+            self.lasts.append(last)
+            self.ends.append(end)
+
+    def columns(self, rest: Fixed) -> Columns:
+        """The segments as columns, for a start `rest` after a whole ns; the last ones asked for are kept."""
+        if self._columns is None or self._columns[0] != rest:
+            self._columns = rest, Columns(self.segments, self.before, self.through, self.lasts, rest)
+        return self._columns[1]
+
+    def times(self, out: Int64Array, first: int, start: Fixed) -> None:
+        """Write the ns of the pulses first .. first + len(out) - 1, which exist and fit int64.
+
+        A small shape keeps all its times: the same ramps come again and again.
+        """
+        if self.steps is None or self.steps > SMALL:
+            self._fill(out, first, start)
+            return
+        whole, rest = start >> FIXED_BITS, start & (ONE_NS - 1)
+        if self._kept is None or self._kept[0] != rest:
+            times = np.empty(self.steps, np.int64)
+            self._fill(times, 1, rest)
+            self._kept = rest, times
+        np.add(self._kept[1][first - 1 : first - 1 + len(out)], whole, out=out)
+
+    def _fill(self, out: Int64Array, first: int, start: Fixed) -> None:
+        last = first + len(out) - 1
+        i, stop = bisect_left(self.through, first), bisect_left(self.through, last)
+        if stop - i > 8 and len(out) < SHORT * (stop - i):
+            self._fill_short(out, first, start)
+            return
+        done = 0
+        while done < len(out):
+            n = first + done
+            through = self.through[i] if i < len(self.through) else last
+            count = min(last, through) - n + 1
+            if count > 0:
+                self.segments[i].fill(out[done : done + count], n - self.before[i], start)
+                done += count
+            i += 1
+
+    def _fill_short(self, out: Int64Array, first: int, start: Fixed) -> None:
+        columns = self.columns(start & (ONE_NS - 1))
+        for done in range(0, len(out), BLOCK):
+            block = out[done : done + BLOCK]
+            np.add(columns.run(first + done, len(block)), start >> FIXED_BITS, out=block)

@@ -1,0 +1,1 @@
+"""Ramp laws, one module each: from speeds and distances to a pulse train."""

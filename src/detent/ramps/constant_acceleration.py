@@ -1,0 +1,67 @@
+"""The GS-C200's ramp: constant acceleration, v**2 = S**2 + (T**2 - S**2) n / R after n steps."""
+
+from fractions import Fraction
+from functools import lru_cache
+from math import isqrt
+from typing import NamedTuple
+
+from detent.pulses import Accelerating, Train, Uniform
+from detent.pulses.shape import AnySegment
+from detent.ticks import ONE_NS, SECOND, Fixed
+
+
+class Move(NamedTuple):
+    """A train that starts at 0, and the steps of its ramps.
+
+    The ramp up ends at pulse `up`; the ramp down begins at pulse steps - `down`. Both are 0 without ramps.
+    """
+
+    train: Train
+    up: int
+    down: int
+
+
+@lru_cache(maxsize=4096)
+def move(start_stop: int, slew: int, ramp: int, steps: int | None) -> Move:
+    """A move of `steps` (None: without end) from `start_stop` to `slew` steps/s and back, ramps of `ramp` steps.
+
+    With fewer than 2 * `ramp` steps the ramp is reversed half way; an odd step in the middle has the peak
+    speed. A slew no higher than the start-stop speed means no ramp: all at `slew`. The first pulse comes one
+    interval after the start, the last one ends the move. Moves that agree on the other arguments give the
+    same times as far as they both speed up, or both go on at the slew speed.
+
+    ValueError unless the speeds are positive, the ramp has a step or more, and steps is not negative.
+    """
+    if start_stop < 1 or slew < 1 or ramp < 1 or (steps is not None and steps < 0):
+        raise ValueError("a move has speeds and a ramp of at least 1, and 0 steps or more: "
+                         f"not start-stop {start_stop}, slew {slew}, ramp {ramp}, steps {steps}")  # fmt: skip
+    if steps == 0:
+        return Move(Train(()), 0, 0)
+    if slew <= start_stop:
+        return Move(Train((Uniform.at_rate(0, slew, steps),)), 0, 0)
+    gain = Fraction(slew * slew - start_stop * start_stop, ramp)
+    up = ramp if steps is None else min(ramp, steps // 2)
+    segments: list[AnySegment] = []
+    now: Fixed = 0
+    if up:
+        segments.append(Accelerating(0, start_stop, gain, 0, up))
+        now = segments[0].fixed(up)
+    if steps is None:
+        return Move(Train((*segments, Uniform.at_rate(now, slew, None))), up, 0)
+    if steps > 2 * up:
+        if up == ramp:
+            middle = Uniform.at_rate(now, slew, steps - 2 * up)
+        else:
+            middle = Uniform.fixed_period(now, _period(start_stop, gain, up), 1)
+        segments.append(middle)
+        now = middle.fixed(steps - 2 * up)
+    if up:
+        segments.append(Accelerating.down_from(now, start_stop, gain, up))
+    return Move(Train(segments), up, up)
+
+
+def _period(start_stop: int, gain: Fraction, n: int) -> Fixed:
+    """The floor of the time between pulses at the speed the ramp has after n steps."""
+    square = start_stop * start_stop + gain * n
+    whole = SECOND * ONE_NS
+    return isqrt(whole * whole * square.denominator // square.numerator)

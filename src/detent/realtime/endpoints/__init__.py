@@ -1,0 +1,1 @@
+"""What clients connect to: a pseudo-terminal, a TCP port, a serial port."""

@@ -1,0 +1,182 @@
+"""A TCP port: the bytes of the line as they are, for one client at a time."""
+
+import contextlib
+import socket
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from detent.realtime.endpoints.endpoint import MOST_READ, EndpointError, Outgoing
+from detent.realtime.pace import WallNs
+from detent.ticks import SECOND
+
+LINGER: WallNs = SECOND  # a client that has said all it had to say may still wait for the answer
+_BACKLOG = 8
+_KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}  # seconds, seconds, times
+
+
+class TcpAddress(NamedTuple):
+    """HOST:PORT. Port 0 is any that is free."""
+
+    host: str
+    port: int
+
+    @classmethod
+    def parse(cls, text: str) -> "TcpAddress":
+        """Read HOST:PORT; an IPv6 host stands in brackets, no host is this computer. Raises ValueError."""
+        host, colon, port = text.rpartition(":")
+        bracketed = host.startswith("[") and host.endswith("]")
+        if not colon or not (port.isascii() and port.isdigit()) or int(port) > 65535 or (":" in host and not bracketed):
+            raise ValueError(f"{text!r} is no HOST:PORT; write 127.0.0.1:4001, [::1]:4001, or port 0 for any free one")
+        return cls(host[1:-1] if bracketed else host or "127.0.0.1", int(port))
+
+    def __str__(self) -> str:
+        """As it is written."""
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+
+class TcpPort:
+    """A listening port for the line `name`. One client at a time; a second one is told so and sent away.
+
+    A client that ends its sending side gets the answers of one more second; it makes room for the next client
+    at once. A client whose computer vanished is dropped after half a minute of silence.
+    """
+
+    kind = "tcp"
+
+    def __init__(self, address: TcpAddress, name: str) -> None:
+        """Raises EndpointError if the port cannot be had."""
+        self._listener = _listen(address)
+        self._name = name
+        host, port = self._listener.getsockname()[:2]
+        self.address = str(TcpAddress(host, port))
+        self._client: socket.socket | None = None
+        self._peer = ""
+        self._until: WallNs | None = None  # the client has said everything, and goes then
+        self._outgoing = Outgoing(self._write)
+
+    @property
+    def dropped(self) -> int:
+        """Bytes that were lost because a client did not read them."""
+        return self._outgoing.dropped
+
+    def reading(self, room: bool) -> Sequence[int]:
+        """The port, for new clients; the client, while the line has room and it has not said everything."""
+        if room and self._client is not None and self._until is None:
+            return (self._listener.fileno(), self._client.fileno())
+        return (self._listener.fileno(),)
+
+    def writing(self) -> Sequence[int]:
+        """The client, while bytes wait."""
+        return (self._client.fileno(),) if self._client is not None and self._outgoing else ()
+
+    def deadline(self) -> WallNs | None:
+        """When a client that has said everything goes."""
+        return self._until
+
+    def due(self, wall: WallNs) -> None:
+        """The client that has said everything goes."""
+        self._leave()
+
+    def receive(self, descriptor: int, wall: WallNs) -> bytes:
+        """A new client, or what the client sent."""
+        if descriptor == self._listener.fileno():
+            self._accept()
+            return b""
+        if self._client is None or descriptor != self._client.fileno():
+            return b""  # it left in this very wake-up
+        try:
+            data = self._client.recv(MOST_READ)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            self._leave()
+            return b""
+        if not data:
+            self._until = wall + LINGER
+        return data
+
+    def send(self, data: bytes, wall: WallNs) -> None:
+        """Give `data` to the client, if there is one."""
+        if self._client is None:
+            return
+        if self._until is not None:
+            self._until = wall + LINGER
+        try:
+            self._outgoing.send(data)
+        except OSError:
+            self._leave()
+
+    def flush(self) -> None:
+        """The client has read something."""
+        try:
+            self._outgoing.flush()
+        except OSError:
+            self._leave()
+
+    def close(self) -> None:
+        """Close the port and the connection."""
+        self._leave()
+        self._listener.close()
+
+    def _write(self, data: bytes) -> int:
+        return self._client.send(data) if self._client is not None else len(data)
+
+    def _accept(self) -> None:
+        try:
+            client, address = self._listener.accept()
+        except OSError:
+            return  # it went away before it was let in, or there is no descriptor left for it
+        peer = str(TcpAddress(address[0], address[1]))
+        if self._client is not None and self._until is None:
+            _refuse(client, f"{self._name} is in use by {self._peer}; one client at a time, try again later")
+            return
+        self._leave()
+        try:
+            client.setblocking(False)
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            for option, value in _KEEPALIVE.items():
+                if hasattr(socket, option):  # not on every system
+                    client.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
+        except OSError:
+            client.close()  # it is gone already
+            return
+        self._client, self._peer = client, peer
+
+    def _leave(self) -> None:
+        """The client goes, or is gone."""
+        self._outgoing.forget()
+        self._until = None
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+
+
+def _listen(address: TcpAddress) -> socket.socket:
+    try:
+        found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise EndpointError(f"{address}: no such host here: {reason}; try 127.0.0.1") from error
+    family, kind, protocol, _, where = found[0]
+    listener = socket.socket(family, kind, protocol)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.setblocking(False)
+        listener.bind(where)
+        listener.listen(_BACKLOG)
+    except OSError as error:
+        listener.close()
+        raise EndpointError(
+            f"{address} cannot be listened on: {error.strerror}; choose another port, or 0 for any free one"
+        ) from error
+    return listener
+
+
+def _refuse(client: socket.socket, text: str) -> None:
+    """Tell a client why it is sent away. What it has sent already is read, or its system would drop the text."""
+    with client, contextlib.suppress(OSError):  # it may be gone: then there is nobody to tell
+        client.setblocking(False)
+        client.sendall(f"detent: {text}\r\n".encode())
+        client.shutdown(socket.SHUT_WR)
+        client.recv(MOST_READ)

@@ -1,0 +1,194 @@
+"""The loop that serves a cell: one thread between the wall clock, the cell and the endpoints of its lines.
+
+A wake-up does everything that it makes possible: the cell catches up with the clock, bytes of clients go to
+their lines, and what the hosts of the lines heard goes out. Characters count as sent when they are read; the
+line then gives them their time. Then the loop sleeps until the next deadline of the cell or the next byte.
+
+`select` is used because it takes microseconds: epoll and poll round a timeout up to whole milliseconds. What
+remains after it (`EARLY`) is spent looking at the descriptors again and again.
+"""
+
+import contextlib
+import os
+import select
+import signal
+import threading
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Protocol, TypeAlias
+
+from detent.lines.line import Heard
+from detent.realtime.endpoints.endpoint import Endpoint
+from detent.realtime.pace import Pace, WallNs
+from detent.ticks import MS, SECOND, US, Ns
+
+EARLY: WallNs = 60 * US  # sleeping is given up so long before a deadline: no system wakes a sleeper to the microsecond
+LONGEST: WallNs = 2 * MS  # a cell that cannot keep pace lets the clients have a word so often
+BEHIND = 64  # characters waiting on a line before its clients have to wait
+
+Wait: TypeAlias = Callable[
+    [Sequence[int], Sequence[int], Sequence[int], float | None], tuple[list[int], list[int], list[int]]
+]
+"""Like `select.select`: wait until something can be read or written, or some seconds have passed."""
+
+
+class ServedLine(Protocol):
+    """What the loop needs of a line."""
+
+    @property
+    def host_busy_until(self) -> Ns:
+        """When everything the host has sent is over."""
+
+    def take(self) -> list[Heard]:
+        """What has reached the host since the last call."""
+
+
+class Served(Protocol):
+    """What the loop needs of a cell."""
+
+    now: Ns
+
+    @property
+    def lines(self) -> Sequence[ServedLine]:
+        """The lines."""
+
+    def next_event(self) -> Ns | None:
+        """When something happens next by itself."""
+
+    def run_to(self, until: Ns) -> None:
+        """Let everything happen up to and including `until`."""
+
+    def send(self, line: int, data: bytes) -> None:
+        """The host of a line sends `data`, now."""
+
+
+class Loop:
+    """Serves `cell` at `pace`; `endpoints` are pairs of a line and what clients of it connect to.
+
+    Several endpoints on a line share it: every one hears everything. `patience` is how far, in cell time, the
+    host of each line may be behind before its clients have to wait.
+    """
+
+    def __init__(
+        self,
+        cell: Served,
+        pace: Pace,
+        endpoints: Sequence[tuple[int, Endpoint]],
+        *,
+        patience: Sequence[Ns] | None = None,
+        wait: Wait = select.select,
+    ) -> None:
+        self._cell, self._pace, self._wait = cell, pace, wait
+        self._endpoints = list(endpoints)
+        self._of_line: dict[int, list[Endpoint]] = defaultdict(list)
+        for line, endpoint in endpoints:
+            self._of_line[line].append(endpoint)
+        self._patience = list(patience) if patience is not None else [0] * len(cell.lines)
+        self._stopping = False
+        self._woken, self._waker = os.pipe()
+        os.set_blocking(self._woken, False)
+        os.set_blocking(self._waker, False)
+
+    def run(self) -> None:
+        """Serve until `stop`. Raises EndpointLost, and what the cell raises."""
+        while not self._stopping:
+            self.step()
+
+    def stop(self) -> None:
+        """End `run` soon. May be called from signal handlers and other threads."""
+        self._stopping = True
+        with contextlib.suppress(BlockingIOError):  # full of earlier calls: it wakes all the same
+            os.write(self._waker, b"\0")
+
+    def close(self) -> None:
+        """Let go of what the loop holds itself; the endpoints are their owner's."""
+        os.close(self._woken)
+        os.close(self._waker)
+
+    def step(self) -> None:
+        """Wait until there is something to do, then do it."""
+        cell, clock, lines = self._cell, self._pace.clock, self._cell.lines
+        readers: dict[int, tuple[int, Endpoint] | None] = {self._woken: None}
+        writers: dict[int, Endpoint] = {}
+        for pair in self._endpoints:
+            line, endpoint = pair
+            room = lines[line].host_busy_until - cell.now <= self._patience[line]
+            for descriptor in endpoint.reading(room):
+                readers[descriptor] = pair
+            for descriptor in endpoint.writing():
+                writers[descriptor] = endpoint
+
+        readable, writable, _ = self._wait(list(readers), list(writers), (), self._timeout())
+        self._catch_up()
+        wall = clock()
+        for descriptor in readable:
+            reader = readers[descriptor]
+            if reader is None:
+                os.read(self._woken, 64)
+                continue
+            line, endpoint = reader
+            data = endpoint.receive(descriptor, wall)
+            if data:
+                cell.send(line, data)
+        for descriptor in writable:
+            writers[descriptor].flush()
+        self._tell(wall)
+        for _, endpoint in self._endpoints:
+            due = endpoint.deadline()
+            if due is not None and due <= wall:
+                endpoint.due(wall)
+
+    def _timeout(self) -> float | None:
+        """Seconds to sleep at most; None if only a client can start anything."""
+        at = self._cell.next_event()
+        due = None if at is None else self._pace.due(at) - EARLY
+        for _, endpoint in self._endpoints:
+            other = endpoint.deadline()
+            if other is not None and (due is None or other < due):
+                due = other
+        if due is None:
+            return None
+        left = due - self._pace.clock()
+        return left / SECOND if left > 0 else 0.0
+
+    def _catch_up(self) -> None:
+        """Run the cell to the present, deadline by deadline, and note how late each was served."""
+        cell, pace = self._cell, self._pace
+        began = wall = pace.clock()
+        present = pace.at(wall)
+        while (at := cell.next_event()) is not None and at <= present:
+            cell.run_to(at)
+            wall = pace.clock()
+            pace.lateness.note(wall - pace.due(at))
+            if wall - began > LONGEST:
+                return  # clients wait; the cell goes on where it was, and its lateness shows it
+        if present > cell.now:
+            cell.run_to(present)
+
+    def _tell(self, wall: WallNs) -> None:
+        """What the hosts heard goes to their clients."""
+        for number, line in enumerate(self._cell.lines):
+            heard = line.take()
+            if heard:
+                data = bytes([char.value & 0xFF for _, char in heard])
+                for endpoint in self._of_line[number]:
+                    endpoint.send(data, wall)
+
+
+@contextlib.contextmanager
+def stopped_by_signals(loop: Loop) -> Iterator[None]:
+    """SIGTERM, SIGINT and SIGHUP stop `loop` while this lasts."""
+    signals = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+    before = {number: signal.signal(number, lambda *_: loop.stop()) for number in signals}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def wake_exactly() -> None:
+    """Ask the system not to put off this thread's wake-ups to save power (50 us on Linux), where it can be asked."""
+    with contextlib.suppress(OSError):
+        Path(f"/proc/{threading.get_native_id()}/timerslack_ns").write_text("1")

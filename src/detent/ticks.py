@@ -1,0 +1,73 @@
+"""Time as integers, and the only rounding in Detent.
+
+Two units, both Python integers of any size:
+
+* ``Ns``: nanoseconds since the cell was made. Every event, pulse and character has one.
+* ``Fixed``: units of 2**-60 ns. A segment of a pulse train starts at such an instant, so that the
+  thirds and square roots of ramps do not add up to a nanosecond, however many segments follow.
+
+A time becomes a nanosecond once, by :func:`round_fixed`, half up.
+"""
+
+from fractions import Fraction
+from typing import TypeAlias
+
+Ns: TypeAlias = int
+Fixed: TypeAlias = int
+
+FIXED_BITS = 60
+ONE_NS: Fixed = 1 << FIXED_BITS
+HALF_NS: Fixed = ONE_NS >> 1
+
+US: Ns = 1_000
+MS: Ns = 1_000_000
+SECOND: Ns = 1_000_000_000
+
+NEVER: Ns = 1 << 100  # a deadline that does not come: later than any time that can be asked for
+
+
+def to_fixed(ns: Ns) -> Fixed:
+    """The instant `ns` in units of 2**-60 ns, exactly."""
+    return ns << FIXED_BITS
+
+
+def round_fixed(fixed: Fixed) -> Ns:
+    """The nanosecond nearest to `fixed`; a tie goes up (towards later)."""
+    return (fixed + HALF_NS) >> FIXED_BITS
+
+
+def round_ratio(numerator: int, denominator: int) -> int:
+    """The integer nearest to numerator / denominator (denominator > 0); a tie goes up."""
+    return (2 * numerator + denominator) // (2 * denominator)
+
+
+_UNITS: dict[str, Ns] = {"ns": 1, "us": US, "ms": MS, "s": SECOND, "min": 60 * SECOND, "h": 3600 * SECOND}
+
+
+def parse_duration(value: str | int | float) -> Ns:
+    """Nanoseconds of ``"400 us"``, ``"1.5s"``, ``"2 min"``; a number without a unit is seconds. Exact.
+
+    Raises ValueError with a text that shows how to write it.
+    """
+    text = str(value).strip().replace("\N{MICRO SIGN}", "u").replace("\N{GREEK SMALL LETTER MU}", "u")
+    number = text.rstrip("abcdefghijklmnopqrstuvwxyz")
+    unit = text[len(number) :] or "s"
+    try:
+        amount = Fraction(number.strip())
+    except (ValueError, ZeroDivisionError):
+        amount = Fraction(-1)
+    if amount < 0 or unit not in _UNITS or "/" in number:
+        raise ValueError(f"{text!r} is no duration: write it like 1.5 s, 400 us, 20 ms, 2 min or 1 h")
+    return round_ratio((amount * _UNITS[unit]).numerator, (amount * _UNITS[unit]).denominator)
+
+
+def show_duration(ns: Ns) -> str:
+    """`ns` for people, like ``1.25 ms`` or ``2 min 3 s``; three to four figures."""
+    for unit, size in (("ns", 1), ("us", US), ("ms", MS), ("s", SECOND)):
+        if ns < 1000 * size or unit == "s":
+            break
+    if ns < 120 * SECOND:
+        return f"{ns / size:.4g} {unit}"
+    seconds = round_ratio(ns, SECOND)
+    hours, minutes, seconds = seconds // 3600, seconds // 60 % 60, seconds % 60
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {seconds} s"
