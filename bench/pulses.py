@@ -13,8 +13,8 @@ from math import isqrt
 
 import numpy as np
 import numpy.typing as npt
-from bench.rows import Row, measure, print_table
 
+from bench.rows import Row, measure, print_table
 from detent.pulses import Accelerating, Table, Ticked, Train, Uniform, arrays
 from detent.ramps.constant_acceleration import move
 from detent.ticks import SECOND, to_fixed

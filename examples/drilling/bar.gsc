@@ -13,7 +13,7 @@
         W2      ; wait until the hole is drilled
         +120    ; next drilling position, 120 steps clockwise
         L4      ; four holes in the loop
-        A2      ; the fifth
+        A2      ; the fifth hole
         C2
         W2      ; wait until it is drilled
         +250    ; reach the cutting position

@@ -22,7 +22,8 @@ class MotionStarted(NamedTuple):
 
     Told at the start of a move (`first` is 1), whenever a running move changes its mind, and when a held
     pulse is let go. Pulses before `first` were given by the trains before it. `shaft` is the motor's place
-    at pulse 0 of this motion, so that pulse n ends at shaft + direction * n.
+    at pulse 0 of this motion, so that pulse n ends at shaft + direction * n. `axis` is the motor's name where
+    a controller has several.
     """
 
     at: Ns
@@ -30,6 +31,7 @@ class MotionStarted(NamedTuple):
     first: int
     direction: int
     shaft: int
+    axis: str = ""
 
 
 class MotionCut(NamedTuple):
@@ -37,6 +39,7 @@ class MotionCut(NamedTuple):
 
     at: Ns
     last: int
+    axis: str = ""
 
 
 class MotionEnded(NamedTuple):
@@ -44,6 +47,7 @@ class MotionEnded(NamedTuple):
 
     at: Ns
     last: int
+    axis: str = ""
 
 
 class Outbox(Protocol):
@@ -66,15 +70,16 @@ class Axis:
     """The motion of one motor. `deadline` says when to call `advance`; it is `NEVER` at rest."""
 
     __slots__ = ("_due", "_held", "_marks", "_open", "_out", "deadline", "direction", "every_pulse",
-                 "pulses", "shaft", "train")  # fmt: skip
+                 "name", "pulses", "shaft", "train")  # fmt: skip
 
-    def __init__(self, out: Outbox, shaft: int = 0) -> None:
+    def __init__(self, out: Outbox, shaft: int = 0, name: str = "") -> None:
         self.shaft = shaft  # at pulse 0 of the motion under way, or at rest
         self.pulses = 0  # given by all motions before this one
         self.direction = 1
         self.train: Train | None = None
         self.deadline: Ns = NEVER
         self.every_pulse = False
+        self.name = name  # where a controller has several
         self._out = out
         self._marks: Marks = ()  # still to come, the last pulse included
         self._due = 0  # the pulse `deadline` stands for, unless that is a mark
@@ -107,7 +112,7 @@ class Axis:
         self.train, self.direction = train, direction
         self._marks = _with_last(marks, train)
         self._held = False
-        self._out.append(MotionStarted(now, train, 1, direction, self.shaft))
+        self._out.append(MotionStarted(now, train, 1, direction, self.shaft, self.name))
         self._plan(1)
 
     def replan(self, train: Train, marks: Marks, now: Ns) -> None:
@@ -116,14 +121,14 @@ class Axis:
         self.train = train
         self._marks = tuple(mark for mark in _with_last(marks, train) if mark > given)
         if not self._held:
-            self._out.append(MotionStarted(now, train, given + 1, self.direction, self.shaft))
+            self._out.append(MotionStarted(now, train, given + 1, self.direction, self.shaft, self.name))
             self._plan(given + 1)
 
     def cut(self, now: Ns) -> None:
         """Stop the pulses at once."""
         given = self.given(now)
         if not self._held:
-            self._out.append(MotionCut(now, given))
+            self._out.append(MotionCut(now, given, self.name))
         self._rest(given)
 
     def gate(self, is_open: bool, now: Ns) -> None:
@@ -140,7 +145,7 @@ class Axis:
         elif self._held:
             self._held = False
             self.train = self.train.shifted(to_fixed(now) - self.train.fixed_time(self._due))
-            self._out.append(MotionStarted(now, self.train, self._due, self.direction, self.shaft))
+            self._out.append(MotionStarted(now, self.train, self._due, self.direction, self.shaft, self.name))
             self._plan(self._due)
         else:
             self._plan(self.train.steps_by(now) + 1)
@@ -152,7 +157,7 @@ class Axis:
             raise RuntimeError("an axis at rest has no deadline: ask `deadline` before `advance`")
         if not self._open:
             self._held, self.deadline = True, NEVER
-            self._out.append(MotionCut(at, self._due - 1))
+            self._out.append(MotionCut(at, self._due - 1, self.name))
             return Moment.HELD, self._due
         marks = self._marks
         if self.every_pulse and (not marks or self._due < marks[0]):
@@ -162,7 +167,7 @@ class Axis:
         pulse = marks[0]
         self._marks = marks[1:]
         if pulse == train.steps:
-            self._out.append(MotionEnded(at, pulse))
+            self._out.append(MotionEnded(at, pulse, self.name))
             self._rest(pulse)
             return Moment.END, pulse
         self._plan(pulse + 1)

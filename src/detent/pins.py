@@ -57,6 +57,9 @@ class PulseOutput(NamedTuple):
     width: Ns
     active: Level
 
+    def __deepcopy__(self, _: object) -> "PulseOutput":
+        return self
+
 
 class PinSet(NamedTuple):
     """An output pin takes a level. Only changes are reported, and every change is."""

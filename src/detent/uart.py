@@ -49,6 +49,13 @@ class Sent(NamedTuple):
     done: Ns
 
 
+class SerialPort(NamedTuple):
+    """A serial port of a device, by the pins that carry its characters."""
+
+    receives: str
+    sends: str
+
+
 class Outbox(Protocol):
     """Where a transmitter tells what it sends: its owner's list of outputs."""
 

@@ -3,14 +3,14 @@
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.recording import InputSet, Received, Recording
 from detent.controllers.device import Powered
-from detent.outputs.signals import PulseOutput, UnitView
-from detent.pins import Pin, PinKind, PinSet
+from detent.outputs.units import UnitView
+from detent.pins import LOW, Pin, PinKind, PinSet, PulseOutput
 from detent.ramps.constant_acceleration import move
 from detent.ticks import MS, SECOND, to_fixed
 from detent.uart import Char, Format, Sent
 
 FORM = Format(9600, 7, "odd", 2)
-CLOCK = PulseOutput("CLOCK", "CLOCK", 1_700)
+CLOCK = PulseOutput({1: "CLOCK", -1: "CLOCK"}, 1_700, LOW)
 PINS = (
     Pin("RXD", 1, PinKind.SERIAL, "received data"),
     Pin("TXD", 2, PinKind.SERIAL, "transmitted data"),

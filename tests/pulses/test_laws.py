@@ -21,22 +21,25 @@ def is_rounded(t: int, truth: Fraction) -> bool:
     return t - HALF <= truth < t + HALF
 
 
-def ramp_time_is_rounded(t: int, anchor: Fraction, slow: Fraction, gain: Fraction, x: int, up: bool) -> bool:
-    """t - 1/2 <= anchor +- 1e9 * (sqrt(s**2 + gain x) - s) * 2 / gain < t + 1/2, by squaring only."""
+def reaches(y: Fraction, slow: Fraction, gain: Fraction, x: int) -> bool:
+    """Whether 1e9 * (sqrt(slow**2 + gain x) - slow) * 2 / gain >= y ns, by squaring only."""
+    return y <= 0 or slow**2 + gain * x >= (y * gain / 2 / 10**9 + slow) ** 2
 
-    def at_least(y: Fraction) -> bool:  # whether the time from the slow end is >= y ns
-        if y <= 0:
-            return True
-        return slow**2 + gain * x >= (y * gain / 2 / 10**9 + slow) ** 2
 
-    if up:
-        return at_least(t - HALF - anchor) and not at_least(t + HALF - anchor)
+def exceeds(y: Fraction, slow: Fraction, gain: Fraction, x: int) -> bool:
+    return y < 0 or slow**2 + gain * x > (y * gain / 2 / 10**9 + slow) ** 2
 
-    # anchor - T >= t - 1/2  is  T <= anchor - t + 1/2: not (T > y), and T > y is at_least but for equality
-    def more(y: Fraction) -> bool:
-        return y < 0 or slow**2 + gain * x > (y * gain / 2 / 10**9 + slow) ** 2
 
-    return not more(anchor - t + HALF) and more(anchor - t - HALF)
+def ramp_time_is_within(low: Fraction, high: Fraction, anchor: Fraction, law: Accelerating, x: int) -> bool:
+    """Whether low <= the time x steps from the slow end < high."""
+    slow, gain = Fraction(law.slow), Fraction(law.gain)
+    if law.up:
+        return reaches(low - anchor, slow, gain, x) and not reaches(high - anchor, slow, gain, x)
+    return not exceeds(anchor - low, slow, gain, x) and exceeds(anchor - high, slow, gain, x)
+
+
+def ramp_time_is_rounded(t: int, anchor: Fraction, law: Accelerating, x: int) -> bool:
+    return ramp_time_is_within(t - HALF, t + HALF, anchor, law, x)
 
 
 def check_inverse(train: Train, n: int) -> None:
@@ -88,7 +91,9 @@ def test_a_ramp_pulse_is_the_rounded_root(slow, gain, low, steps, up, start, dat
     for n in (1, steps, data.draw(st.integers(1, steps))):
         x = low + n if up else low + steps - n
         anchor = Fraction(start, ONE_NS) + 10**20
-        assert ramp_time_is_rounded(train.time_of(n), anchor, slow, gain, x, up)
+        assert ramp_time_is_rounded(train.time_of(n), anchor, ramp, x)
+        floor = train.fixed_time(n)
+        assert ramp_time_is_within(Fraction(floor, ONE_NS), Fraction(floor + 1, ONE_NS), anchor, ramp, x)
         check_inverse(train, n)
 
 
@@ -114,7 +119,8 @@ def test_a_long_ramp_full_of_ties_is_exact_in_arrays_too(up, offset):
     # slow 3, gain 40: v = sqrt(9 + 40 x) is whole for many x, and t = (v - 3) * 5e7 ns is then a whole ns;
     # an anchor of half a ns, and one unit of 2**-60 ns on either side, put these on ties and next to them
     steps = 60_000
-    train = Train((Accelerating(to_fixed(10**12) + HALF_NS + offset, 3, 40, 0, steps, up),), 0)
+    law = Accelerating(to_fixed(10**12) + HALF_NS + offset, 3, 40, 0, steps, up)
+    train = Train((law,), 0)
     times = train.times()
     some = {n for v in range(3, 1600) if (v * v - 9) % 40 == 0
             for n in ((v * v - 9) // 40, steps - (v * v - 9) // 40) if 1 <= n <= steps}  # fmt: skip
@@ -123,7 +129,7 @@ def test_a_long_ramp_full_of_ties_is_exact_in_arrays_too(up, offset):
         assert times[n - 1] == train.time_of(n)
         x = n if up else steps - n
         anchor = 10**12 + HALF + Fraction(offset, ONE_NS)
-        assert ramp_time_is_rounded(train.time_of(n), anchor, Fraction(3), Fraction(40), x, up)
+        assert ramp_time_is_rounded(train.time_of(n), anchor, law, x)
 
 
 def test_a_ramp_down_begins_exactly_where_it_is_told_to():
@@ -135,10 +141,11 @@ def test_a_ramp_down_begins_exactly_where_it_is_told_to():
 
 
 def test_a_ramp_of_two_thousand_million_steps_is_exact():
-    slow, gain, steps = Fraction(1), Fraction(9, 10), 2 * 10**9
-    train = Train((Accelerating(0, slow, gain, 0, steps),))
+    steps = 2 * 10**9
+    law = Accelerating(0, 1, Fraction(9, 10), 0, steps)
+    train = Train((law,))
     for n in (1, 2, 10**9, steps - 1, steps):
-        assert ramp_time_is_rounded(train.time_of(n), Fraction(0), slow, gain, n, True)
+        assert ramp_time_is_rounded(train.time_of(n), Fraction(0), law, n)
         check_inverse(train, n)
     assert train.times(steps - 40_000, steps).tolist()[::777] == [
         train.time_of(n) for n in range(steps - 40_000, steps + 1, 777)

@@ -3,11 +3,12 @@
 Whatever cannot be built is a `Problem` with the key and the remedy, and nothing is built.
 """
 
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, NamedTuple
 
-from detent.assembler import AssemblyFailed, ImageError, assemble
-from detent.cell.cell import Action, Cell, Store, Wiring, no_store
+from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
+from detent.cell.cell import Cell, Store, Wiring, no_store
+from detent.cell.deeds import Action, Power, SetSwitch, Type
 from detent.cell.description import Description, Problem, ScriptEntry, Unit
 from detent.cell.parts import PARTS, Part
 from detent.cell.switches import AxisSwitch, Switch
@@ -29,12 +30,14 @@ def build(
     store: Store = no_store,
     record: bool = True,
     line_timing: bool = True,
+    journal: Iterable[Action] = (),
 ) -> Cell:
     """The cell, switched on at time 0, with its programs started.
 
-    `images` are the units' non-volatile memories as they were kept, `store` keeps them. Raises Problem.
+    `images` are the units' non-volatile memories as they were kept, `store` keeps them. `journal` is what was done
+    to a cell like this one: with it, the same happens again. Raises Problem.
     """
-    return _Builder(description, read).cell(images or {}, store, record, line_timing)
+    return _Builder(description, read).cell(images or {}, store, record, line_timing, journal)
 
 
 class _End(NamedTuple):
@@ -58,7 +61,9 @@ class _Builder:
     def problem(self, key: str, message: str) -> Problem:
         return Problem(self.description.file, key, message)
 
-    def cell(self, images: Mapping[str, bytes], store: Store, record: bool, line_timing: bool) -> Cell:
+    def cell(
+        self, images: Mapping[str, bytes], store: Store, record: bool, line_timing: bool, journal: Iterable[Action]
+    ) -> Cell:
         lines = self.line_units()
         self.make_units(lines, line_timing)
         self.make_switches()
@@ -67,8 +72,9 @@ class _Builder:
         self.check_nets()
         cell = Cell(self.wiring(lines), self.parts, [Net() for _ in self.nets],
                     [self.line(units, line_timing) for units in lines.values()],
-                    actions, store=store, record=record)  # fmt: skip
+                    [*actions, *journal], store=store, record=record)  # fmt: skip
         self.switch_on(cell, images)
+        cell.journaling = True
         return cell
 
     # -- units -------------------------------------------------------------------------------------------
@@ -233,10 +239,17 @@ class _Builder:
             for pin in pins:
                 self.parts[part].watch(pin)
         followers = [tuple(s for s, unit in self.axes.items() if unit == part) for part in range(len(self.parts))]
-        line_units = tuple(tuple(self.names.index(unit) for unit in of_line) for of_line in lines.values())
-        line_of = tuple(next((n for n, of in enumerate(line_units) if unit in of), -1) for unit in range(units))
+        hears: list[tuple[tuple[int, str], ...]] = []
+        speaks: list[dict[str, tuple[int, int]]] = [{} for _ in range(units)]
+        line_of = [-1] * units
+        for line, names in enumerate(lines.values()):
+            ports = [(self.names.index(name), self.controller(name).serial_port) for name in names]
+            hears.append(tuple((unit, port.receives) for unit, port in ports))
+            for place, (unit, port) in enumerate(ports):
+                speaks[unit][port.sends] = line, place
+                line_of[unit] = line
         return Wiring(tuple(self.names), units, tuple(drives), tuple(reads), tuple(followers),
-                      line_units, tuple(lines), line_of)  # fmt: skip
+                      tuple(hears), tuple(lines), tuple(line_of), tuple(speaks))  # fmt: skip
 
     # -- script ------------------------------------------------------------------------------------------
 
@@ -246,18 +259,17 @@ class _Builder:
         found = []
         for target, level in entry.set.items():
             name = self.settable(f"{key}.set", target)
-            found.append(Action(entry.at, f"{target} = {level}", _Set(name, level)))
+            found.append(Action(entry.at, SetSwitch(name, level)))
         for unit, on in entry.power.items():
             self.need_unit(f"{key}.power", unit)
-            found.append(Action(entry.at, f"{unit} power {'on' if on else 'off'}", _Power(unit, on)))
+            found.append(Action(entry.at, Power(unit, on)))
         if entry.send:
             if entry.to is None:
                 raise self.problem(f"{key}.to", "say which unit the line is for: to = 'UNIT'")
             self.need_unit(f"{key}.to", entry.to)
             if entry.to not in {unit for units in self.line_units().values() for unit in units}:
                 raise self.problem(f"{key}.to", f"{entry.to} is on no line: put it on one in [lines]")
-            for text in entry.send:
-                found.append(Action(entry.at, f"{entry.to} <- {text}", _Type(entry.to, text)))
+            found += [Action(entry.at, Type(entry.to, text)) for text in entry.send]
         return found
 
     def settable(self, key: str, target: str) -> str:
@@ -287,10 +299,10 @@ class _Builder:
         units = self.description.units
         for index in range(len(units), len(self.parts)):
             cell.switch_on(index)
-        programs = {name: self.image(name, unit, "program") for name, unit in units.items() if unit.program}
+        programs = {name: self.assembled(name, unit, "program") for name, unit in units.items() if unit.program}
         for name, unit in units.items():
             if unit.eeprom or name in images:
-                image = images[name] if name in images else self.image(name, unit, "eeprom")
+                image = images[name] if name in images else self.assembled(name, unit, "eeprom").image
                 try:
                     self.controller(name).restore(image)
                 except ImageError as error:
@@ -298,12 +310,12 @@ class _Builder:
         for name, unit in units.items():
             if unit.powered:
                 cell.power(name, True)
-        for name, image in programs.items():
-            self.controller(name).load(image, cell.now)
+        for name, assembly in programs.items():
+            self.controller(name).load(assembly.image, assembly.base, cell.now)
             cell.start(name)
 
-    def image(self, name: str, unit: Unit, key: str) -> bytes:
-        """The program image in the file that `key` of the unit names."""
+    def assembled(self, name: str, unit: Unit, key: str) -> Assembly[Any]:
+        """The program in the file that `key` of the unit names."""
         file = getattr(unit, key)
         where = f"units.{name}.{key}"
         try:
@@ -312,8 +324,8 @@ class _Builder:
             reason = error.strerror if isinstance(error, OSError) else "it is no text file"
             raise self.problem(where, f"cannot read {file}: {reason or error}") from None
         try:
-            return assemble(catalogue.language(unit.model), text, file).image
-        except AssemblyFailed as error:
+            return assemble(catalogue.language(unit.model), text, file)
+        except (AssemblyFailed, CatalogueError) as error:
             raise self.problem(where, str(error)) from None
 
     # -- names -------------------------------------------------------------------------------------------
@@ -329,33 +341,3 @@ class _Builder:
     def need_unit(self, key: str, name: str) -> None:
         if name not in self.description.units:
             raise self.problem(key, str(catalogue.unknown("unit", name, tuple(self.description.units))))
-
-
-class _Set(NamedTuple):
-    """Put a switch to a level."""
-
-    switch: str
-    level: Level
-
-    def __call__(self, cell: Cell) -> None:
-        cell.set_switch(self.switch, self.level)
-
-
-class _Power(NamedTuple):
-    """Switch a unit's supply."""
-
-    unit: str
-    on: bool
-
-    def __call__(self, cell: Cell) -> None:
-        cell.power(self.unit, self.on)
-
-
-class _Type(NamedTuple):
-    """Send a command line to a unit."""
-
-    unit: str
-    text: str
-
-    def __call__(self, cell: Cell) -> None:
-        cell.type(self.unit, self.text)

@@ -12,9 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.recording import InputSet, Received, Recording
+from detent.cell.deeds import Action, Deed, Power, Send, SetPin, SetSwitch, Start
+from detent.cell.recording import InputSet, Log, Received, Recording
 from detent.controllers.device import Controller, Device, Output, Powered, StoreImage
-from detent.lines.line import Line
+from detent.lines.line import EVERYBODY, Line
 from detent.pins import HIGH, Level, Net, PinSet
 from detent.ticks import NEVER, Ns
 from detent.uart import Sent
@@ -36,24 +37,6 @@ class Follower(Protocol):
         """The axis does this."""
 
 
-class Deed(Protocol):
-    """Something that a script does to its cell. Immutable."""
-
-    def __call__(self, cell: "Cell", /) -> None:
-        """Do it, now."""
-
-
-class Action(NamedTuple):
-    """One entry of the cell's script: at this time, this is done to the cell."""
-
-    at: Ns
-    what: str  # for people
-    do: Deed
-
-    def __deepcopy__(self, _: object) -> "Action":
-        return self
-
-
 class Wiring(NamedTuple):
     """What never changes in a cell: copied by reference. Parts are meant by their index in `Cell.parts`."""
 
@@ -62,11 +45,21 @@ class Wiring(NamedTuple):
     drives: tuple[Mapping[str, int], ...]  # part -> pin -> net
     reads: tuple[tuple[tuple[int, str], ...], ...]  # net -> (part, pin)
     followers: tuple[tuple[int, ...], ...]  # part -> parts that follow its axis
-    lines: tuple[tuple[int, ...], ...]  # line -> units on it
+    lines: tuple[tuple[tuple[int, str], ...], ...]  # line -> units on it, each with the port it hears on
     line_names: tuple[str, ...]
-    line_of: tuple[int, ...]  # unit -> line; -1: none
+    line_of: tuple[int, ...]  # unit -> line of its host; -1: none
+    speaks: tuple[Mapping[str, tuple[int, int]], ...]  # unit -> port it sends from -> line, place on the line
 
     def __deepcopy__(self, _: object) -> "Wiring":
+        return self
+
+
+class Script(tuple[Action, ...]):
+    """Actions in order of time. Immutable, and shared by copies of a cell."""
+
+    __slots__ = ()
+
+    def __deepcopy__(self, _: object) -> "Script":
         return self
 
 
@@ -96,8 +89,11 @@ class Cell:
         self.now: Ns = 0
         self.store = store
         self.recording: Recording | None = Recording(wiring.names[: wiring.units]) if record else None
-        self._script = tuple(sorted(script, key=lambda action: action.at))
+        self.journal: Log[Action] = Log()  # what was done from outside, if the cell records: see `replay`
+        self.journaling = False  # from the moment on when the cell is built
+        self._script = Script(sorted(script, key=lambda action: action.at))
         self._next_action = 0
+        self._acting = False  # the script is doing it
         self._deadlines: list[Ns] = [NEVER] * len(parts)
         self._line_deadline: Ns = NEVER  # the earliest of all lines
         self._script_deadline: Ns = self._script[0].at if self._script else NEVER
@@ -145,6 +141,7 @@ class Cell:
 
     def send(self, line: int, data: bytes) -> None:
         """The host of a line sends `data`, now."""
+        self._note(Send(line, data))
         self.lines[line].send(data, self.now)
         self._plan_lines()
         self._catch_up()
@@ -158,12 +155,14 @@ class Cell:
         self.send(line, self.controller(unit).frame(text))
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:
-        """Drive an input pin from outside, now: a probe, or a hand with a wire. Other drivers of its net are not asked."""
+        """Drive an input pin from outside, now: a hand with a wire. Other drivers of its net are not asked."""
+        self._note(SetPin(unit, pin, level))
         self._set_pin(self.unit(unit), pin, level)
         self._settle()
 
     def set_switch(self, name: str, level: Level) -> None:
         """Put a switch of the cell to `level`, now."""
+        self._note(SetSwitch(name, level))
         index = self.wiring.names.index(name, self.wiring.units)
         self.parts[index].set_pin("SET", level, self.now)
         self._touched.add(index)
@@ -171,6 +170,7 @@ class Cell:
 
     def power(self, unit: str, on: bool) -> None:
         """Switch the supply of a unit, now."""
+        self._note(Power(unit, on))
         index = self.unit(unit)
         self.parts[index].power(on, self.now)
         self._touched.add(index)
@@ -184,6 +184,7 @@ class Cell:
 
     def start(self, unit: str) -> None:
         """Start the program in the unit's memory, now."""
+        self._note(Start(unit))
         self.controller(unit).start(self.now)
         self._touched.add(self.unit(unit))
         self._settle()
@@ -217,22 +218,27 @@ class Cell:
 
     def _settle(self) -> None:
         """Deliver in rounds until nobody has anything more to tell."""
-        parts, touched, deadlines = self.parts, self._touched, self._deadlines
+        touched = self._touched
         while touched:
-            round_ = sorted(touched) if len(touched) > 1 else list(touched)
-            touched.clear()
-            told = []
-            for index in round_:
-                part = parts[index]
-                out = part.drain()
-                deadline = part.next_deadline()
-                deadlines[index] = NEVER if deadline is None else deadline
-                if out:
-                    told.append((index, out))
-            for index, out in told:
-                self._deliver(index, out)
+            if len(touched) == 1:  # nearly always
+                index = touched.pop()
+                self._deliver(index, self._drain(index))
+            else:
+                round_ = sorted(touched)
+                touched.clear()
+                for index, out in [(index, self._drain(index)) for index in round_]:
+                    self._deliver(index, out)
+
+    def _drain(self, index: int) -> Sequence[Output]:
+        """What a part did, and when it wants to be advanced next."""
+        part = self.parts[index]
+        deadline = part.next_deadline()
+        self._deadlines[index] = NEVER if deadline is None else deadline
+        return part.drain()
 
     def _deliver(self, index: int, out: Sequence[Output]) -> None:
+        if not out:
+            return
         if index < self.wiring.units and self.recording is not None:
             self.recording.extend(index, out)
         drives = self.wiring.drives[index]
@@ -243,9 +249,9 @@ class Cell:
                 if net is not None:
                     self._drive(net, (index, item.pin), item.level)  # type: ignore[union-attr]
             elif kind is Sent:
-                line = self.wiring.line_of[index]
-                if line >= 0:
-                    self.lines[line].from_unit(item)  # type: ignore[arg-type]
+                place = self.wiring.speaks[index].get(item.port)  # type: ignore[union-attr]
+                if place is not None:
+                    self.lines[place[0]].from_unit(place[1], item)  # type: ignore[arg-type]
                     self._plan_lines()
             elif kind in _MOTION:
                 for follower in self.wiring.followers[index]:
@@ -282,6 +288,10 @@ class Cell:
         self.parts[index].set_pin(pin, level, self.now)
         self._touched.add(index)
 
+    def _note(self, deed: Deed) -> None:
+        if self.journaling and self.recording is not None and not self._acting:
+            self.journal.append(Action(self.now, deed))
+
     def _plan_lines(self) -> None:
         self._line_deadline = min((line.deadline for line in self.lines), default=NEVER)
 
@@ -291,14 +301,12 @@ class Cell:
             if line.deadline > at:
                 continue
             arrived = line.advance(at)
-            if not arrived:
-                continue
-            chars = [sent.char for sent in arrived]
-            for unit in units:
-                if self.recording is not None:
-                    self.recording.extend(unit, [Received(s.done, "RXD", s.char, s.at) for s in arrived])
-                self.parts[unit].receive("RXD", chars, at)
-                self._touched.add(unit)
+            for place, (unit, port) in enumerate(units):
+                if heard := [arrival.sent for arrival in arrived if arrival.place in (place, EVERYBODY)]:
+                    if self.recording is not None:
+                        self.recording.extend(unit, [Received(s.done, port, s.char, s.at) for s in heard])
+                    self.parts[unit].receive(port, [sent.char for sent in heard], at)
+                    self._touched.add(unit)
         self._plan_lines()
         self._settle()
 
@@ -307,7 +315,9 @@ class Cell:
         while self._next_action < len(self._script) and self._script[self._next_action].at <= at:
             action = self._script[self._next_action]
             self._next_action += 1
-            action.do(self)
+            self._acting = True
+            action.deed.do(self)
+            self._acting = False
         left = self._script[self._next_action :]
         self._script_deadline = left[0].at if left else NEVER
 

@@ -5,7 +5,8 @@ the log; the first of several copies to go on writes into the shared list, the o
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple, TypeAlias
+from itertools import islice
+from typing import Generic, NamedTuple, Self, TypeAlias, TypeVar
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.controllers.device import Output
@@ -34,6 +35,8 @@ class Received(NamedTuple):
 
 Entry: TypeAlias = Output | InputSet | Received
 
+T = TypeVar("T")
+
 
 class Span(NamedTuple):
     """Pulses `first` to `last` of `train` (none if last < first), given in `direction` by one unit.
@@ -51,47 +54,62 @@ class Span(NamedTuple):
     shaft: int
 
 
-class Recording:
-    """The log of one cell and the names of its units."""
+class Log(Generic[T]):
+    """An append-only list that is shared by its copies up to where they part. Copying costs the same at any length."""
 
-    __slots__ = ("_log", "_size", "units")
+    __slots__ = ("_items", "_size")
 
-    def __init__(self, units: Sequence[str]) -> None:
-        self.units = tuple(units)
-        self._log: list[tuple[int, Entry]] = []
-        self._size = 0
+    def __init__(self) -> None:
+        self._items: list[T] = []
+        self._size = 0  # items that are ours; a copy may have appended more
 
     def __len__(self) -> int:
         return self._size
 
-    def __iter__(self) -> Iterator[tuple[int, Entry]]:
-        """All entries, in the order in which they happened."""
-        log = self._log
-        return (log[i] for i in range(self._size))
+    def __iter__(self) -> Iterator[T]:
+        return islice(self._items, self._size)
 
-    def extend(self, unit: int, entries: Sequence[Entry]) -> None:
-        """Append what one unit did."""
-        if len(self._log) != self._size:  # a copy has gone on from here already: part from it
-            self._log = self._log[: self._size]
-        self._log.extend([(unit, entry) for entry in entries])
-        self._size = len(self._log)
+    def append(self, item: T) -> None:
+        """Add one item, which must not change any more."""
+        if len(self._items) != self._size:  # a copy has gone on from here already: part from it
+            self._items = self._items[: self._size]
+        self._items.append(item)
+        self._size += 1
 
-    def copy(self) -> "Recording":
-        """The same log up to here; whichever goes on second makes its own."""
-        twin = Recording.__new__(Recording)
-        twin.units, twin._log, twin._size = self.units, self._log, self._size
+    def __deepcopy__(self, _: object) -> Self:
+        twin = type(self).__new__(type(self))
+        twin._items, twin._size = self._items, self._size  # noqa: SLF001 (its own class)
         return twin
 
-    def __deepcopy__(self, _: object) -> "Recording":
-        return self.copy()
+
+class Recording:
+    """What the units of one cell did, in batches: whatever one unit did in one go costs one append."""
+
+    __slots__ = ("_batches", "units")
+
+    def __init__(self, units: Sequence[str]) -> None:
+        self.units = tuple(units)
+        self._batches: Log[tuple[int, Sequence[Entry]]] = Log()
+
+    def __len__(self) -> int:
+        """How many entries there are."""
+        return sum(len(entries) for _, entries in self._batches)
+
+    def __iter__(self) -> Iterator[tuple[int, Entry]]:
+        """All entries, in the order in which they happened."""
+        return ((unit, entry) for unit, entries in self._batches for entry in entries)
+
+    def extend(self, unit: int, entries: Sequence[Entry]) -> None:
+        """Add what one unit did."""
+        self._batches.append((unit, entries))
 
     def of(self, unit: str) -> list[Entry]:
         """The entries of one unit, in order."""
         index = self.units.index(unit)
         return [entry for i, entry in self if i == index]
 
-    def motion(self, unit: str, until: Ns) -> list[Span]:
-        """The pulses of one unit up to `until`, in order and without gaps or overlaps."""
+    def motion(self, unit: str, until: Ns, axis: str = "") -> list[Span]:
+        """The pulses of one axis of a unit up to `until`, in order and without gaps or overlaps."""
         spans: list[Span] = []
         current: MotionStarted | None = None
 
@@ -103,10 +121,10 @@ class Recording:
 
         for entry in self.of(unit):
             match entry:
-                case MotionStarted():
+                case MotionStarted() if entry.axis == axis:
                     close(entry.at, entry.first - 1)
                     current = entry
-                case MotionCut() | MotionEnded():
+                case MotionCut() | MotionEnded() if entry.axis == axis:
                     close(entry.at, entry.last)
         if current is not None:
             close(until, current.train.steps_by(until))

@@ -67,14 +67,16 @@ class AxisSwitch(Switch):
     None for an end means that the range goes on without end there.
     """
 
-    def __init__(self, low: int | None, high: int | None, inside: Level, shaft: int = 0) -> None:
-        self._low, self._high, self._inside = low, high, inside
+    def __init__(self, low: int | None, high: int | None, inside: Level, shaft: int = 0, axis: str = "") -> None:
+        self._low, self._high, self._inside, self._axis = low, high, inside, axis
         self._motion: MotionStarted | None = None
         self._pulse = 0  # the one at which the level changes next
         super().__init__(self._level_at(shaft))
 
     def follow(self, motion: MotionStarted | MotionCut | MotionEnded) -> None:
         """The axis starts, stops or changes its mind. A change that is due in this very instant still comes."""
+        if motion.axis != self._axis:
+            return
         match motion:
             case MotionStarted():
                 self._motion = motion

@@ -58,24 +58,8 @@ def _tables(model: "Model") -> dict[str, Rows]:
         "options": [
             {"option": o.name, "takes": o.takes, "default": o.default, "what": o.help} for o in model.options
         ],
-        "commands": [
-            {
-                "command": " ".join(row.forms),
-                "argument": row.argument.words,
-                "bytes": row.length,
-                "type": row.use.type,
-                "when": ", ".join(_when(row)),
-                "what": row.help,
-                "section": row.section,
-            }
-            for row in model.commands()
-        ],
+        "commands": [row._asdict() for row in model.commands()],
     }
-
-
-def _when(row: Any) -> list[str]:
-    states = (("idle", row.idle), ("programming", row.programming), ("running", row.running))
-    return [word for word, yes in states if yes]
 
 
 def reference(model: "Model") -> str:

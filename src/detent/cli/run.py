@@ -80,17 +80,20 @@ def run(
     except ValueError as error:
         asked_wrongly(ValueError(f"--for: {error}"))
     try:
-        exchanges = [exchange for unit, text in lines for exchange in _exchange(cell, unit, text)]
+        exchanges = [_exchange(cell, unit, text) for unit, text in lines]
         ended = _run_on(cell, until)
     except Oscillation as error:
         failed(error)
-    for path, write in ((vcd, "vcd"), (sr, "sigrok"), (npz, "arrays"), (plot, "figures")):
-        if path is not None:
-            _write(write, path, cell, found.description.title or found.name)
+    try:
+        _write(cell, found.description.title or found.name, plot=plot, vcd=vcd, sr=sr, npz=npz)
+    except ValueError as error:
+        asked_wrongly(error)
+    except OSError as error:
+        failed(f"{error.filename}: cannot write it: {error.strerror}")
     if json:
-        print(json_text.dumps(_result(cell, ended, exchanges)))
+        print(json_text.dumps(result(cell, ended, exchanges)))
     else:
-        _print_result(cell, ended, exchanges, wanted)
+        print_result(cell, ended, exchanges, wanted)
 
 
 class Exchange(NamedTuple):
@@ -119,19 +122,20 @@ def _addressed(cell: "Cell", text: str) -> tuple[str, str]:
     return unit, line
 
 
-def _exchange(cell: "Cell", unit: str, text: str) -> list[Exchange]:
+def _exchange(cell: "Cell", unit: str, text: str) -> Exchange:
     """Send a line and let the cell go on until it is answered and the line is quiet, or nothing is left to do."""
+    from detent.ticks import NEVER
+
     line = cell.lines[cell.wiring.line_of[cell.unit(unit)]]
     line.take()
     cell.type(unit, text)
     for _ in range(MOST_INSTANTS):
-        heard = bytes(h.char.value for h in line.heard)
-        if heard.endswith(b"\r") and line.deadline > cell.now and (cell.next_event() or 0) != cell.now:
+        if line.heard and line.deadline >= NEVER:
             break
         if cell.step() is None:
             break
-    answers = bytes(h.char.value for h in line.take()).decode("ascii", "replace")
-    return [Exchange(unit, text, [answer for answer in answers.split("\r") if answer])]
+    heard = bytes(h.char.value for h in line.take())
+    return Exchange(unit, text, cell.controller(unit).answers(heard))
 
 
 def _run_on(cell: "Cell", until: "Ns | None") -> str:
@@ -145,11 +149,35 @@ def _run_on(cell: "Cell", until: "Ns | None") -> str:
     return "endless"
 
 
-def _write(kind: str, path: Path, cell: "Cell", title: str) -> None:
-    raise NotImplementedError
+def _write(
+    cell: "Cell", title: str, *, plot: Path | None, vcd: Path | None, sr: Path | None, npz: Path | None
+) -> None:
+    """Write the files that are wanted. Raises ValueError for a wrong choice, OSError."""
+    if plot is None and vcd is None and sr is None and npz is None:
+        return
+    from detent.outputs import signals
+
+    seen = signals.of_cell(cell)
+    if vcd is not None:
+        from detent.outputs import vcd as vcd_file
+
+        vcd_file.write(vcd, seen)
+    if sr is not None:
+        from detent.outputs import sigrok
+
+        sigrok.write(sr, seen)
+    if npz is not None:
+        from detent.outputs import arrays
+
+        arrays.write(npz, seen)
+    if plot is not None:
+        from detent.outputs import figures
+
+        figures.write(plot, seen, title=title)
 
 
-def _result(cell: "Cell", ended: str, exchanges: list[Exchange]) -> dict[str, object]:
+def result(cell: "Cell", ended: str, exchanges: list[Exchange]) -> dict[str, object]:
+    """Where everything ended, as --json prints it."""
     units = {name: unit.status(cell.now)._asdict() for name, unit in cell.controllers().items()}
     result: dict[str, object] = {"time_ns": cell.now, "ended": ended, "units": units}
     if exchanges:
@@ -157,7 +185,8 @@ def _result(cell: "Cell", ended: str, exchanges: list[Exchange]) -> dict[str, ob
     return result
 
 
-def _print_result(cell: "Cell", ended: str, exchanges: list[Exchange], written: list[Path]) -> None:
+def print_result(cell: "Cell", ended: str, exchanges: list[Exchange], written: list[Path]) -> None:
+    """Where everything ended, for people."""
     from rich.console import Console
     from rich.table import Table
 

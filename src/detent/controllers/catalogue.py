@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from typing import Any, NamedTuple, Protocol
 
 from detent.assembler import Language
-from detent.controllers.device import Controller
+from detent.controllers.device import CommandHelp, Controller
 from detent.controllers.gsc200 import commands as gsc200_commands
 from detent.controllers.gsc200 import pins as gsc200_pins
 from detent.controllers.gsc200 import program as gsc200_program
@@ -42,8 +42,8 @@ class Model(NamedTuple):
     straps: Mapping[str, Level]
     options: tuple[Option, ...]
     make: Callable[..., Controller]
-    language: Callable[[], Language[Any]]
-    commands: Callable[[], Sequence[gsc200_commands.Row]]
+    language: Callable[[], Language[Any]] | None  # None: it holds no programs
+    commands: Callable[[], Sequence[CommandHelp]]
     strap_line: Callable[[Sequence[tuple[str, Mapping[str, Level]]]], list[dict[str, Level]]]
 
 
@@ -64,7 +64,11 @@ def model(name: str) -> Model:
 
 def language(name: str) -> Language[Any]:
     """The language of a model's programs. Raises CatalogueError."""
-    return model(name).language()
+    found = model(name)
+    if found.language is None:
+        speak = [other.name for other in MODELS.values() if other.language is not None]
+        raise CatalogueError(f"a {name} holds no programs; models that do: {', '.join(speak)}")
+    return found.language()
 
 
 class Configurable(Protocol):
@@ -167,7 +171,7 @@ def _gsc200(name: str, options: tuple[Option, ...]) -> Model:
         options,
         lambda straps, **keywords: GsC200(name, straps, **keywords),
         lambda: gsc200_program.language(name),
-        lambda: gsc200_commands.rows(name),
+        lambda: gsc200_commands.reference(name),
         gsc200_pins.strap_line,
     )
 

@@ -18,7 +18,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.pins import Level, Pin, PinSet, PulseOutput
 from detent.ticks import Ns
-from detent.uart import Char, Format, Sent
+from detent.uart import Char, Format, Sent, SerialPort
 
 
 class Executing(NamedTuple):
@@ -56,8 +56,20 @@ Output: TypeAlias = (
 )
 
 
+class CommandHelp(NamedTuple):
+    """A row of a controller's command table as people read it."""
+
+    command: str
+    argument: str
+    bytes: int  # in program memory; 0: not stored
+    type: str
+    when: str
+    what: str
+    section: str  # of the manual
+
+
 class Status(NamedTuple):
-    """What a glance at a device tells: the axis position by its own counter, pulses sent, a word of state."""
+    """What a glance at an axis tells: its position by the controller's counter, pulses given, a word of state."""
 
     position: int
     pulses: int
@@ -67,13 +79,15 @@ class Status(NamedTuple):
 class Device(Protocol):
     """Anything that sits in a cell."""
 
-    pins: Sequence[Pin]
+    @property
+    def pins(self) -> Sequence[Pin]:
+        """Its pin table."""
 
     def power(self, on: bool, now: Ns) -> None:
         """Switch the supply. Everything volatile is lost; straps are read at the next power-on."""
 
     def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
-        """Characters whose stop bits end at `now` on the serial input `port`."""
+        """Characters whose stop bits end at `now` on the serial input pin `port`."""
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
         """An input pin takes a level."""
@@ -88,7 +102,7 @@ class Device(Protocol):
         """Do everything that is due up to and including `now`, which is never beyond `next_deadline`."""
 
     def drain(self) -> list[Output]:
-        """What the device did since the last call, in order."""
+        """What the device did since the last call, in order: a list that it does not keep."""
 
     def watch(self, pin: str) -> None:
         """A wire leads from this pulse output to another device: report its every pulse as `PinSet`."""
@@ -106,20 +120,31 @@ class Controller(Device, Protocol):
         """The pins that carry its step pulses."""
 
     @property
-    def line_format(self) -> Format:
-        """How characters look on its serial line."""
+    def serial_port(self) -> SerialPort:
+        """The port towards its host."""
 
-    def status(self, now: Ns) -> Status:
-        """Where it is and what it does, at `now`."""
+    @property
+    def line_format(self) -> Format:
+        """How characters look on that port."""
+
+    @property
+    def axes(self) -> Sequence[str]:
+        """The names of its axes; one without a name where it has but one."""
+
+    def status(self, now: Ns, axis: str = "") -> Status:
+        """Where an axis is and what the controller does, at `now`; the first axis unless it is named."""
 
     def frame(self, text: str) -> bytes:
         """The bytes a host sends for the command line `text`: address, checksum and terminator added."""
 
+    def answers(self, data: bytes) -> list[str]:
+        """What a host reads in the bytes that came from it: the answers, without what the link adds."""
+
     def restore(self, image: bytes) -> None:
         """Put `image` into non-volatile memory, before the first power-on. Raises `detent.assembler.ImageError`."""
 
-    def load(self, image: bytes, now: Ns) -> None:
-        """Put a program image into program memory, as if a host had sent it. Raises `detent.assembler.ImageError`."""
+    def load(self, image: bytes, base: int, now: Ns) -> None:
+        """Put a program image into program memory from address `base` on, as if a host had sent it. Raises `detent.assembler.ImageError`."""
 
     def start(self, now: Ns) -> None:
         """Start the program in memory, as if a host had asked for it."""

@@ -11,6 +11,7 @@ from detent.ticks import NEVER, Ns
 from detent.uart import Char, Format, Sent, Transmitter
 
 HOST_PORT = "HOST"
+EVERYBODY = -1
 
 
 class Heard(NamedTuple):
@@ -18,6 +19,13 @@ class Heard(NamedTuple):
 
     at: Ns
     char: Char
+
+
+class Arrival(NamedTuple):
+    """A character that has reached the unit at `place` on the line, or everybody."""
+
+    place: int
+    sent: Sent
 
 
 class _Talking(NamedTuple):
@@ -51,8 +59,8 @@ class Line:
         """When the last stop bit of what the host has sent so far ends."""
         return self._host.busy_until
 
-    def from_unit(self, sent: Sent) -> None:
-        """A unit begins a character."""
+    def from_unit(self, place: int, sent: Sent) -> None:
+        """The unit at `place` on the line begins a character."""
         began, done, char = sent.at, sent.done, sent.char
         for index, other in enumerate(self._from_units):
             if (other.began, other.done) == (began, done) and began < done:
@@ -65,7 +73,7 @@ class Line:
         self._from_units.append(_Talking(began, done, char))
         self._plan()
 
-    def advance(self, now: Ns) -> list[Sent]:
+    def advance(self, now: Ns) -> list[Arrival]:
         """Deliver what is due: to the host into `heard`; returned is what reaches the units at `now`."""
         self._host.advance(now)
         due = [talking for talking in self._from_units if talking.done <= now]
@@ -75,13 +83,13 @@ class Line:
         arrived = [sent for sent in self._on_wire if sent.done <= now]
         if arrived:
             del self._on_wire[: len(arrived)]
-            limit = 1 << self.format.data_bits
-            arrived = [
-                sent if sent.char.value < limit else sent._replace(char=Char(sent.char.value % limit, parity_ok=False))
-                for sent in arrived
-            ]
         self._plan()
-        return arrived
+        return [Arrival(EVERYBODY, self._narrowed(sent)) for sent in arrived]
+
+    def _narrowed(self, sent: Sent) -> Sent:
+        """The character as it arrives: one too wide for the line has its parity spoilt."""
+        value, width = sent.char.value, 1 << self.format.data_bits
+        return sent if value < width else sent._replace(char=Char(value % width, parity_ok=False))
 
     def take(self) -> list[Heard]:
         """What has reached the host since the last call."""

@@ -45,7 +45,13 @@ def _about(unit: UnitSignals) -> dict[str, Any]:
     return {
         "pins": list(unit.pins),
         "position_at_0": unit.start,
-        "pulse_output": None if output is None else output._asdict(),
+        "pulse_output": None
+        if output is None
+        else {
+            "pins": {f"{way:+d}": pin for way, pin in output.pins.items()},
+            "width_ns": output.width,
+            "active": output.active,
+        },
     }
 
 

@@ -48,9 +48,7 @@ def channels(signals: Signals, names: Sequence[str] | None = None) -> list[Chann
     return [every[name] for name in names]
 
 
-def write(
-    path: Path, signals: Signals, *, samplerate: int = SAMPLERATE, names: Sequence[str] | None = None
-) -> None:
+def write(path: Path, signals: Signals, *, samplerate: int = SAMPLERATE, names: Sequence[str] | None = None) -> None:
     """Write the file, whole or not at all.
 
     `samplerate` is in samples a second, `names` chooses channels. ValueError for a samplerate that is too low

@@ -102,7 +102,9 @@ class _Dump:
             same = np.full(len(first), variable, np.int64)
             columns.append(_Rows(times[inside], first, same, pulses.positions[inside]))
             variable += 1
-        rows = _Rows(*(np.concatenate(parts) for parts in zip(*columns, strict=True))) if columns else _Rows(*[_NONE] * 4)
+        if not columns:
+            return _Rows(*[np.empty(0, np.int64)] * 4)
+        rows = _Rows(*(np.concatenate(parts) for parts in zip(*columns, strict=True)))
         index = np.lexsort((rows.order, rows.times))
         return _Rows(*(column[index] for column in rows))
 
@@ -122,14 +124,11 @@ class _Dump:
         identifiers = self._id_text[rows.variables]
         parts += [(identifiers, identifiers != 0), (np.full((len(new), 1), 10, np.uint8), _all(rows))]
         text = np.concatenate([text for text, _ in parts], axis=1)
-        mask = np.concatenate([mask for _, mask in parts], axis=1)
-        return text[mask].tobytes()
+        wanted = np.concatenate([mask for _, mask in parts], axis=1)
+        return bytes(text[wanted])
 
     def _is_position(self) -> Mask:
         return np.array([last for unit in self._signals.units for last in [*[False] * len(unit.pins), True]], np.bool_)
-
-
-_NONE = np.empty(0, np.int64)
 
 
 def _all(rows: _Rows) -> Mask:

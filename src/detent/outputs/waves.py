@@ -77,10 +77,11 @@ class Spoken(NamedTuple):
 
 
 def serial_wave(characters: Sequence[Spoken], form: Format) -> Wave:
-    """The logic levels of a serial wire: 1 at rest, start bit 0, data from the least significant bit, parity, stop bits 1.
+    """The logic levels of a serial wire.
 
-    A character damaged on the line has its parity bit inverted, its stop bits 0. Characters that took no time
-    (a link without line timing) leave no trace.
+    1 at rest; start bit 0, data bits from the least significant one on, parity, stop bits 1. A character damaged
+    on the line has its parity bit inverted, its stop bits 0. Characters that took no time (a link without line
+    timing) leave no trace.
     """
     timed = [spoken for spoken in characters if spoken.begin < spoken.end]
     if not timed:

@@ -7,6 +7,7 @@ one integer root away, and the inverse needs no root at all.
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import lru_cache
 from math import floor, isqrt, sqrt
 
 from detent.pulses import arrays
@@ -47,16 +48,10 @@ class Accelerating(Immutable):
             raise ValueError(f"a ramp has a slow speed >= 0 and a gain > 0, not {self.slow} and {self.gain}")
         if not 0 <= self.low <= self.high:
             raise ValueError(f"a ramp has 0 <= low <= high, not {self.low} and {self.high}")
-        s, r = self.slow.numerator, self.slow.denominator
-        p, q = self.gain.numerator, self.gain.denominator
-        twice, divisor = 2 * FIXED_PER_S * q, p * r
-        object.__setattr__(self, "root_gain", twice * twice * p * r * r // q)
-        object.__setattr__(self, "slow_root", twice * s)
-        object.__setattr__(self, "divisor", divisor)
-        scale = divisor << FIXED_BITS
-        object.__setattr__(self, "gain_ns", self.root_gain / (scale * scale))
-        object.__setattr__(self, "slow_ns", max(self.slow_root / scale, TINY))
-        object.__setattr__(self, "square_ns", self.slow_ns**2)
+        slow, gain = self.slow, self.gain
+        made = _constants(slow.numerator, slow.denominator, gain.numerator, gain.denominator)
+        for name, value in zip(_DERIVED, made, strict=True):
+            object.__setattr__(self, name, value)
 
     @classmethod
     def down_from(cls, begin: Fixed, slow: Fraction | int, gain: Fraction | int, steps: int) -> "Accelerating":
@@ -64,8 +59,9 @@ class Accelerating(Immutable):
 
         The anchor is rounded up, so that the floor of the first instant is `begin` itself.
         """
-        at_zero = cls(0, slow, gain, 0, steps, up=False)
-        return replace(at_zero, anchor=begin - at_zero.fixed(0))
+        p, q, d, *_ = _constants(slow.numerator, slow.denominator, gain.numerator, gain.denominator)
+        root = isqrt(p * steps + q * q - 1) + 1 if steps else q
+        return cls(begin - (q - root) // d, slow, gain, 0, steps, up=False)
 
     @property
     def steps(self) -> int:
@@ -157,3 +153,16 @@ class Accelerating(Immutable):
     def fill(self, out: Int64Array, first: int, start: Fixed) -> None:
         """Write the ns of the pulses first .. first + len(out) - 1."""
         arrays.fill_ramp(out, first, self, start)
+
+
+_DERIVED = ("root_gain", "slow_root", "divisor", "gain_ns", "slow_ns", "square_ns")
+
+
+@lru_cache(maxsize=256)
+def _constants(s: int, r: int, p: int, q: int) -> tuple[int, int, int, float, float, float]:
+    """The derived fields of a ramp with slow speed s/r and gain p/q; the few ramps of a program come again."""
+    twice, divisor = 2 * FIXED_PER_S * q, p * r
+    root_gain, slow_root = twice * twice * p * r * r // q, twice * s
+    scale = divisor << FIXED_BITS
+    slow_ns = max(slow_root / scale, TINY)
+    return root_gain, slow_root, divisor, root_gain / (scale * scale), slow_ns, slow_ns**2

@@ -17,7 +17,6 @@ AnySegment: TypeAlias = Uniform | Accelerating | Table | Ticked
 
 SMALL = 1 << 13  # pulses of a shape whose times are kept
 SHORT = 1 << 10  # pulses a segment, on average, below which columns are quicker than segment after segment
-BLOCK = 1 << 14  # pulses of such segments at a time
 
 
 class Shape:
@@ -82,7 +81,7 @@ class Shape:
         last = first + len(out) - 1
         i, stop = bisect_left(self.through, first), bisect_left(self.through, last)
         if stop - i > 8 and len(out) < SHORT * (stop - i):
-            self._fill_short(out, first, start)
+            self.columns(start & (ONE_NS - 1)).run(first, out, start >> FIXED_BITS)
             return
         done = 0
         while done < len(out):
@@ -93,9 +92,3 @@ class Shape:
                 self.segments[i].fill(out[done : done + count], n - self.before[i], start)
                 done += count
             i += 1
-
-    def _fill_short(self, out: Int64Array, first: int, start: Fixed) -> None:
-        columns = self.columns(start & (ONE_NS - 1))
-        for done in range(0, len(out), BLOCK):
-            block = out[done : done + BLOCK]
-            np.add(columns.run(first + done, len(block)), start >> FIXED_BITS, out=block)

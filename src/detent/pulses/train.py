@@ -8,9 +8,10 @@ import numpy as np
 
 from detent.pulses.segment import Immutable, Int64Array, State
 from detent.pulses.shape import AnySegment, Shape
-from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, Fixed, Ns
+from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, Fixed, Ns, to_fixed
 
 INT64 = range(-(1 << 63), 1 << 63)
+EASY: Fixed = to_fixed(1 << 62)  # starts and ends below this stay within int64 together
 BELOW_ONE = 1.0 - 2.0**-53
 
 
@@ -197,36 +198,37 @@ class Train(Immutable):
         n = np.asarray(n)
         if n.dtype.kind not in "iu":
             raise TypeError(f"pulses have whole numbers, not {n.dtype}")
-        flat = n.ravel().astype(np.int64)
-        if not flat.size:
-            return flat.reshape(n.shape)
-        low, high = int(flat.min()), int(flat.max())
-        self.time_of(low)
-        self.time_of(high)
-        self._check_int64(low, high)
-        whole, rest = self.start >> FIXED_BITS, self.start & (ONE_NS - 1)
-        if not self._shape.segments:
-            return np.full(n.shape, self.time_of(0))
-        result = self._shape.columns(rest).times_of(flat)
-        result += whole
-        return result.reshape(n.shape)
+        result = np.empty(n.shape, np.int64)
+        if n.size and not self._shape.segments:
+            self.time_of(int(n.max()))
+            result[...] = self.time_of(int(n.min()))
+        elif n.size:
+            for end in (int(n.min()), int(n.max())):
+                self.time_of(end)
+                self._check_int64(end, end)
+            whole, rest = self.start >> FIXED_BITS, self.start & (ONE_NS - 1)
+            self._shape.columns(rest).times_of(n.ravel().astype(np.int64, copy=False), result.ravel(), whole)
+        return result
 
     def counts_by(self, t: Int64Array) -> Int64Array:
         """`steps_by` for an integer array of any shape."""
         t = np.asarray(t)
         if t.dtype.kind not in "iu":
             raise TypeError(f"times are whole ns, not {t.dtype}")
-        flat = t.ravel().astype(np.int64)
-        if not flat.size or not self._shape.segments:
-            return np.zeros(t.shape, np.int64)
-        whole, rest = self.start >> FIXED_BITS, self.start & (ONE_NS - 1)
-        steps, ends = self._shape.steps, self._shape.ends
-        lowest = whole - 1
-        highest = int(flat.max()) if steps is None else whole + (ends[-1] >> FIXED_BITS) + 2
-        if lowest not in INT64 or highest - whole not in INT64:
-            raise OverflowError(f"a train that starts at {whole} ns has no int64 counts: use steps_by")
-        np.clip(flat, lowest, min(highest, INT64[-1]), out=flat)
-        return self._shape.columns(rest).counts_by(flat - whole).reshape(t.shape)
+        if t.dtype == np.uint64:
+            t = np.minimum(t, np.uint64(INT64[-1]))
+        result = np.zeros(t.shape, np.int64)
+        if t.size and self._shape.segments:
+            whole, rest = self.start >> FIXED_BITS, self.start & (ONE_NS - 1)
+            # nothing happens before the start, nor after the end; between them differences fit int64
+            steps, ends = self._shape.steps, self._shape.ends
+            highest = int(t.max()) if steps is None else whole + (ends[-1] >> FIXED_BITS) + 2
+            if whole - 1 not in INT64 or highest - whole not in INT64:
+                raise OverflowError(f"a train that starts at {whole} ns has no int64 counts: use steps_by")
+            relative = np.clip(t.ravel().astype(np.int64, copy=False), whole - 1, min(highest, INT64[-1]))
+            relative -= whole
+            self._shape.columns(rest).counts_by(relative, result.ravel())
+        return result
 
     def _last(self, last: int | None) -> int:
         steps = self._shape.steps
@@ -239,6 +241,9 @@ class Train(Immutable):
         return last
 
     def _check_int64(self, first: int, last: int) -> None:
+        ends = self._shape.ends
+        if -EASY < self.start < EASY and self._shape.steps is not None and ends[-1] < EASY:
+            return
         for n in (first, last):
             t = self.time_of(n)
             if t not in INT64 or self.start >> FIXED_BITS not in INT64:

@@ -9,6 +9,8 @@ from detent.pulses import Accelerating, Train, Uniform
 from detent.pulses.shape import AnySegment
 from detent.ticks import ONE_NS, SECOND, Fixed
 
+ONE_SECOND: Fixed = SECOND * ONE_NS
+
 
 class Move(NamedTuple):
     """A train that starts at 0, and the steps of its ramps.
@@ -62,6 +64,6 @@ def move(start_stop: int, slew: int, ramp: int, steps: int | None) -> Move:
 
 def _period(start_stop: int, gain: Fraction, n: int) -> Fixed:
     """The floor of the time between pulses at the speed the ramp has after n steps."""
-    square = start_stop * start_stop + gain * n
-    whole = SECOND * ONE_NS
-    return isqrt(whole * whole * square.denominator // square.numerator)
+    # 1e9 / v with v**2 = square / denominator
+    square = start_stop * start_stop * gain.denominator + gain.numerator * n
+    return isqrt(ONE_SECOND * ONE_SECOND * gain.denominator // square)

@@ -33,6 +33,10 @@ class Pace:
         self._origin = origin
         self._began: WallNs = clock()
 
+    def restart(self, origin: Ns) -> None:
+        """The cell time is `origin` now."""
+        self._origin, self._began = origin, self.clock()
+
     def at(self, wall: WallNs) -> Ns:
         """The cell time at `wall`."""
         return self._origin + (wall - self._began) * self._multiply // self._divide

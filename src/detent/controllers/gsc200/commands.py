@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import Final, NamedTuple
 
+from detent.controllers.device import CommandHelp
 from detent.controllers.gsc200.arguments import Address, Argument, Condition, Direction, Number, Signed
 
 GS_C200: Final = "gs-c200"
@@ -286,6 +287,22 @@ def rows(model: str) -> tuple[Row, ...]:
         return _ROWS[model]
     except KeyError:
         raise ValueError(f"no model {model!r} speaks this language; choose {' or '.join(MODELS)}") from None
+
+
+def reference(model: str) -> list[CommandHelp]:
+    """The table as people read it."""
+    return [
+        CommandHelp(
+            " ".join(row.forms),
+            row.argument.words,
+            row.length,
+            row.use.type,
+            ", ".join(mode for mode in ("idle", "programming", "running") if getattr(row, mode)),
+            row.help,
+            row.section,
+        )
+        for row in rows(model)
+    ]
 
 
 def row(model: str, op: Op) -> Row:

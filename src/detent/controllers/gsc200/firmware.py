@@ -19,7 +19,7 @@ from detent.controllers.gsc200.program import Program, ProgramFull
 from detent.controllers.gsc200.running import Running
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind, PulseOutput
 from detent.ticks import MS, NEVER, Ns
-from detent.uart import Char, Format, Transmitter
+from detent.uart import Char, Format, SerialPort, Transmitter
 
 INSTRUCTION_TIME: Ns = 1 * MS  # our assumption: no loop takes no time, no output pulse has no width
 FIRST_ORED_REVISION = (2, 2)  # of the GS-C200: from here on the checksum is ORed with 10h
@@ -40,7 +40,7 @@ class GsC200:
         shaft: int = 0,
     ) -> None:
         self.model = model
-        self.pins: Sequence[Pin] = pins.PINS + pins.SEPARATE_CLOCKS if separate_clocks else pins.PINS
+        self._separate_clocks = separate_clocks
         self._straps = {**pins.DEFAULT_STRAPS, **(straps or {})}
         self._clears_on_home = model != GS_C200S
         self._ored = model == GS_C200S or revision >= FIRST_ORED_REVISION
@@ -59,7 +59,7 @@ class GsC200:
         """Everything volatile as it is at power-on."""
         straps = self._straps
         self._link = Link(pins.address(straps), straps["CHS"] == HIGH, self._ored)
-        self._transmitter = Transmitter("TXD", self.line_format, self._out, timed=self._line_timing)
+        self._transmitter = Transmitter(pins.SERIAL_PORT.sends, self.line_format, self._out, timed=self._line_timing)
         self._deaf = False  # no reception: REC low and RXD tied high
         self._inbox: deque[Char] = deque()  # characters behind an M that is being stored
         self._storing: Program | None = None
@@ -153,16 +153,31 @@ class GsC200:
     # -- the controller as seen from outside -------------------------------------------------------------
 
     @property
+    def pins(self) -> Sequence[Pin]:
+        """The connector, and the two clocks of figure 10 where they were ordered."""
+        return pins.PINS_SEPARATE_CLOCKS if self._separate_clocks else pins.PINS
+
+    @property
     def pulse_output(self) -> PulseOutput:
         """CLOCK, or CW and CCW with the circuit of figure 10; low for 1.7 us."""
-        return pins.SEPARATE_CLOCK_OUTPUT if pins.SEPARATE_CLOCKS[0] in self.pins else pins.CLOCK_OUTPUT
+        return pins.SEPARATE_CLOCK_OUTPUT if self._separate_clocks else pins.CLOCK_OUTPUT
+
+    @property
+    def serial_port(self) -> SerialPort:
+        """RXD and TXD."""
+        return pins.SERIAL_PORT
+
+    @property
+    def axes(self) -> Sequence[str]:
+        """One axis, without a name."""
+        return ("",)
 
     @property
     def line_format(self) -> Format:
         """How characters look on its line, by its straps."""
         return pins.character_format(self._straps)
 
-    def status(self, now: Ns) -> Status:
+    def status(self, now: Ns, axis: str = "") -> Status:
         """The position counter, pulses given since made, and one word: off ready programming running homing."""
         if not self._powered:
             state = "off"
@@ -176,12 +191,16 @@ class GsC200:
         """The command line `text` as a host sends it to this module."""
         return self._link.dress(text, to_module=True)
 
+    def answers(self, data: bytes) -> list[str]:
+        """The answers in what this module sent."""
+        return self._link.undress(data)
+
     def restore(self, image: bytes) -> None:
         """Put `image` into the EEPROM. Raises `detent.assembler.ImageError` and keeps the old one."""
         self._eeprom = program.from_image(self.model, image)
 
-    def load(self, image: bytes, now: Ns) -> None:
-        """Put `image` into RAM, as P and its instructions would. Raises `detent.assembler.ImageError`."""
+    def load(self, image: bytes, base: int, now: Ns) -> None:
+        """Put `image` into RAM, where programs start at address 0, as P and its instructions would. Raises `detent.assembler.ImageError`."""
         self.advance(now)
         self._ram = program.from_image(self.model, image)
 
@@ -335,8 +354,15 @@ class GsC200:
             self._ram = program.empty(self.model)
 
     def _next(self) -> Ns:
-        kept = NEVER if self._kept is None else self._transmitter.busy_until
-        return min(self._running.deadline, self._transmitter.deadline, kept)
+        """The earliest deadline; written out, as nothing is asked more often."""
+        at = self._motion.deadline
+        if (timer := self._running.timer) < at:
+            at = timer
+        if (character := self._transmitter.deadline) < at:
+            at = character
+        if self._kept is not None and (quiet := self._transmitter.busy_until) < at:
+            at = quiet
+        return at
 
     _IMMEDIATE: ClassVar[dict[Op, Callable[["GsC200", Instruction, Ns], None]]] = {
         Op.EXECUTE: _execute,

@@ -44,6 +44,14 @@ class Link:
             data += bytes([self.checksum(data)])
         return data + b"\r"
 
+    def undress(self, data: bytes) -> list[str]:
+        """The answers in what a module sent, without checksums and CR. A wrong checksum stays, and shows."""
+        answers = []
+        for line in data.split(b"\r"):
+            sound = self.checksums and line and self.checksum(line[:-1]) == line[-1]
+            answers.append((line[:-1] if sound else line).decode("latin-1"))
+        return [answer for answer in answers if answer]
+
     def feed(self, char: Char) -> Frame | None:
         """Take one character; return the frame it completes, if that is for this module.
 

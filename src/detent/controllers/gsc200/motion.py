@@ -85,7 +85,7 @@ class Motion:
         n + 1 + R in slew, and stays what it is in the down ramp. Without a ramp, and in homing, it stops at once.
         """
         current, train = self._move, self._axis.train
-        if self.course is not Course.MOVE or current is None or train is None or not (current.up or current.down):
+        if self.course is not Course.MOVE or current is None or train is None or self.slew <= self.start_stop:
             self.halt(now)
             return
         given = self._axis.given(now)

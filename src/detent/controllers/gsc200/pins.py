@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from detent.pins import HIGH, LOW, Level, Pin, PinKind, PulseOutput
-from detent.uart import Format
+from detent.uart import Format, SerialPort
 
 CLOCK_LOW_NS = 1_700  # the step pulse (pin 28)
 RESET_LOW_NS = 400_000  # the reset pulse (pin 27)
@@ -50,8 +50,12 @@ SEPARATE_CLOCKS: tuple[Pin, ...] = (
     Pin("CCW", None, _OUT, "step clock, counterclockwise steps only (circuit of figure 10)"),
 )
 
+PINS_SEPARATE_CLOCKS: tuple[Pin, ...] = PINS + SEPARATE_CLOCKS
+
 CLOCK_OUTPUT = PulseOutput({1: "CLOCK", -1: "CLOCK"}, CLOCK_LOW_NS, LOW)
 SEPARATE_CLOCK_OUTPUT = PulseOutput({1: "CW", -1: "CCW"}, CLOCK_LOW_NS, LOW)
+
+SERIAL_PORT = SerialPort("RXD", "TXD")
 
 DEFAULT_STRAPS: Mapping[str, Level] = {
     "SEL0": HIGH, "SEL1": HIGH, "SEL2": HIGH,  # point to point

@@ -40,7 +40,7 @@ class Running:
         self.after_homing: Program | None = None  # to be run behind the homing at power-on
         self._program: Program | None = None
         self._flow = Flow()
-        self._timer: Ns = NEVER  # the next instruction
+        self.timer: Ns = NEVER  # when the next instruction is reached
         self._waiting = ""  # the user input that a W waits for, or that ends a velocity move
         self._stopping = False  # Z was given: the program ends with the move
         self._endless = False  # a velocity move, which on the GS-C200 meets the end of the counter
@@ -48,7 +48,8 @@ class Running:
     @property
     def deadline(self) -> Ns:
         """When something happens by itself."""
-        return min(self._timer, self._motion.deadline)
+        timer, motion = self.timer, self._motion.deadline
+        return timer if timer < motion else motion
 
     @property
     def homing(self) -> bool:
@@ -103,7 +104,7 @@ class Running:
                     self._moved(now)
         elif level == HIGH:
             self._waiting = ""
-            self._timer = now + self._instruction_time
+            self.timer = now + self._instruction_time
         return False
 
     def advance(self, at: Ns) -> None:
@@ -112,7 +113,7 @@ class Running:
             if self._motion.advance(at):
                 self._moved(at)
         else:
-            self._timer = NEVER
+            self.timer = NEVER
             self._fetch(at)
 
     def initialize(self, which: int, now: Ns) -> None:
@@ -145,7 +146,7 @@ class Running:
         self.busy = self._stopping = self._endless = False
         self.error = error or self.error
         self.after_homing = None
-        self._timer = NEVER
+        self.timer = NEVER
         self._waiting = ""
         self._pins.set("RDY", HIGH, now)
 
@@ -179,7 +180,7 @@ class Running:
     def _go_on(self, step: Step, done: Ns) -> None:
         """The instruction is done at `done`; the next is reached one instruction time later."""
         self._flow.address = step.next
-        self._timer = done + self._instruction_time
+        self.timer = done + self._instruction_time
 
     def _activate(self, step: Step, now: Ns) -> None:
         self._pins.set(USER_OUTPUTS[step.instruction.value], HIGH, now)
@@ -214,7 +215,7 @@ class Running:
 
     def _branch(self, step: Step, now: Ns) -> None:
         self._flow.follow(step, self.user_inputs())
-        self._timer = now + self._instruction_time
+        self.timer = now + self._instruction_time
 
     def _wait(self, step: Step, now: Ns) -> None:
         pin = USER_INPUTS[step.instruction.value]
@@ -255,7 +256,7 @@ class Running:
         self.error = 5
         self._flow.restart()
         self._flow.address = self._program.size
-        self._timer = now + self._instruction_time
+        self.timer = now + self._instruction_time
         return True
 
     def _moved(self, now: Ns) -> None:
@@ -268,7 +269,7 @@ class Running:
         elif self._stopping:
             self._end(now)
         else:
-            self._timer = now + self._instruction_time
+            self.timer = now + self._instruction_time
 
     _DO: ClassVar[dict[Op, Callable[["Running", Step, Ns], None]]] = {
         Op.ACTIVATE: _activate,

@@ -1,0 +1,6 @@
+; The long axis.
+        S10     ; start-stop speed 100 steps/s
+        T100    ; slew speed 1000 steps/s
+        R50     ; ramps of 50 steps
+        W1      ; wait for the start switch
+        +1000

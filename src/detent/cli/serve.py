@@ -1,0 +1,197 @@
+"""The verb `serve`: a controller or a cell in real time, on terminals, ports and wires."""
+
+import json as json_text
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from detent.cell.description import Description
+    from detent.realtime.endpoints.wanted import Wanted
+    from detent.realtime.service import Served, Service
+
+
+def serve(
+    target: Annotated[str | None, Parameter(show_default=False)] = None,
+    *,
+    pty: Annotated[list[Path] | None, Parameter(consume_multiple=(0, 1), negative=())] = None,
+    tcp: str | None = None,
+    serial: Path | None = None,
+    pace: float = 1.0,
+    line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
+    strap: Annotated[Sequence[str], Parameter(negative=())] = (),
+    set_: Annotated[Sequence[str], Parameter(name="--set", negative=())] = (),
+    state: Path | None = None,
+    json: bool = False,
+) -> None:
+    """Serve a controller or a cell in real time, until Ctrl-C.
+
+    Without --pty, --tcp and --serial every line gets the endpoint of its cell file, or a pseudo-terminal.
+    What to connect to is printed.
+
+    Parameters
+    ----------
+    target
+        A model by name, or a cell file (CELL.toml).
+    pty
+        Open a pseudo-terminal; with a value, make this symbolic link to it (of several lines: LINK-LINE).
+    tcp
+        Listen on HOST:PORT for one client at a time. Port 0: any free port; several lines count up from PORT.
+    serial
+        Be the controller at this serial device. The line timing is then left to the wire.
+    pace
+        Run so many times as fast as real time.
+    line_timing
+        Let characters take their time on the serial line.
+    strap
+        PIN=LEVEL (low, high, open), or UNIT.PIN=LEVEL for a cell.
+    set_
+        OPTION=VALUE, or UNIT.OPTION=VALUE for a cell.
+    state
+        Keep EEPROM images in this folder instead of $XDG_STATE_HOME/detent or ~/.local/state/detent.
+    json
+        Print one line of JSON once everything is open, and nothing else.
+    """
+    from detent.cell.cell import Oscillation
+    from detent.cell.description import Problem
+    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.target import target as find
+    from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost
+    from detent.realtime.images import Images, ImagesUnusable, cell_name, default_folder
+    from detent.realtime.service import Service, models
+
+    links = list(pty) if pty is not None else None
+    if target is None and links:  # `serve --pty gs-c200`: what follows --pty was meant to be served
+        target, links = str(links[0]), []
+    try:
+        if target is None:
+            raise Problem("", "", "say what to serve: a model like gs-c200 (detent models), or a CELL.toml")
+        if not (math.isfinite(pace) and pace > 0):
+            raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
+        wanted = _wanted(links, tcp, serial)
+        found = find(target, straps=strap, options=set_)
+        folder = state if state is not None else default_folder()
+        name = cell_name(target, is_file=bool(found.description.file))
+        images = Images(folder, name, models(found.description))
+    except (Problem, ImagesUnusable) as error:
+        asked_wrongly(error)
+    try:
+        try:
+            service = Service(found.description, found.read, wanted, pace=pace, line_timing=line_timing, images=images)
+        except (Problem, EndpointError) as error:
+            asked_wrongly(error)
+        except ValueError as error:
+            asked_wrongly(Problem("", "", str(error)))
+        with service:
+            for report in service.reports:
+                print(f"detent: {report}", file=sys.stderr)
+            if json:
+                print(json_text.dumps(_facts(service.endpoints)), flush=True)
+            else:
+                _print_ready(service, found.description, folder, pace)
+            try:
+                service.run()
+            except (EndpointLost, Oscillation) as error:
+                failed(error)
+        if not json:
+            _print_end(service)
+    finally:
+        images.close()
+
+
+def _wanted(links: list[Path] | None, tcp: str | None, serial: Path | None) -> "list[Wanted]":
+    """The endpoints that the command line asks for. Raises Problem."""
+    from detent.cell.description import Problem
+    from detent.realtime.endpoints.wanted import Wanted
+
+    wanted = []
+    if links is not None:
+        wanted.append(Wanted("pty", str(links[0]) if links else ""))
+    if tcp is not None:
+        try:
+            wanted.append(Wanted("tcp", tcp).checked())
+        except ValueError as error:
+            raise Problem("", "--tcp", str(error)) from None
+    if serial is not None:
+        wanted.append(Wanted("serial", str(serial)))
+    return wanted
+
+
+def _facts(endpoints: "Sequence[Served]") -> dict[str, object]:
+    """What `--json` tells."""
+    return {
+        "endpoints": [{"unit": e.unit, "kind": e.kind, "address": e.address} for e in endpoints],
+        "control": None,
+    }
+
+
+def _print_ready(service: "Service", description: "Description", folder: Path, pace: float) -> None:
+    """Say what is served, and how to connect: a line to copy for each endpoint."""
+    speed = "real time" if pace == 1 else f"{pace:g} times real time"
+    print(f"Serving {', '.join(description.units)} in {speed}; EEPROM images in {folder}")
+    for unit, line in _straps(description):
+        print(f"  {unit}: {line}")
+    print("Connect:")
+    width = max(len(endpoint.unit) for endpoint in service.endpoints)
+    commands = [(endpoint, _command(endpoint)) for endpoint in service.endpoints]
+    longest = max(len(command) for _, command in commands)
+    for endpoint, command in commands:
+        print(f"  {endpoint.unit:{width}}  {command:{longest}}  # {_what(endpoint)}")
+    print("Ctrl-C ends it.", flush=True)
+
+
+def _straps(description: "Description") -> list[tuple[str, str]]:
+    """Every controller with its model and its straps as they are read."""
+    from detent.controllers import catalogue
+
+    listed = []
+    alone = [[name] for name in description.units if not description.lines]
+    for units in [line.units for line in description.lines.values()] + alone:
+        found = [catalogue.MODELS.get(description.units[unit].model) for unit in units]
+        if found[0] is None or None in found:
+            continue  # a part without a serial line
+        named = [
+            (unit, {pin: catalogue.strap_level(found[0], pin, level) for pin, level in straps.items()})
+            for unit in units
+            for straps in [description.units[unit].straps]
+        ]
+        for unit, levels in zip(units, found[0].strap_line(named), strict=True):
+            text = " ".join(f"{pin}={level}" for pin, level in levels.items())
+            listed.append((unit, f"{description.units[unit].model}, straps {text}"))
+    return listed
+
+
+def _command(endpoint: "Served") -> str:
+    """A line that connects a terminal to an endpoint."""
+    match endpoint.kind:
+        case "pty":  # without the format, which a pseudo-terminal does not have
+            return f"picocom --baud {endpoint.form.baud} {endpoint.address}"
+        case "tcp":
+            host, _, port = endpoint.address.rpartition(":")
+            host = {"0.0.0.0": "127.0.0.1", "[::]": "::1"}.get(host, host.strip("[]"))
+            # Enter sends CR, at once: what the controllers wait for and a terminal in its usual mode never sends
+            return f"stty -icrnl -icanon; nc {host} {port}; stty sane"
+        case _:
+            return endpoint.address
+
+
+def _what(endpoint: "Served") -> str:
+    """What kind of endpoint it is."""
+    match endpoint.kind:
+        case "pty":
+            return f"pseudo-terminal, {endpoint.form}"
+        case "tcp":
+            return f"TCP {endpoint.address}, {endpoint.form}"
+        case _:
+            return f"the wire at this serial port, {endpoint.form}"
+
+
+def _print_end(service: "Service") -> None:
+    print(f"Ended after {service.cell.now / 1e9:.3f} s: {service.lateness()}.")
+    dropped = service.dropped()
+    if dropped:
+        print(f"{dropped} bytes were lost because a client did not read them.")

@@ -1,0 +1,233 @@
+"""What a figure draws, as arrays: positions, speeds, levels and instructions, no finer than its columns of pixels.
+
+The work is bounded by the number of columns and of motions, whatever the number of pulses: trains are asked
+where they are at chosen times, and speeds come from the laws of their segments.
+"""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from detent.axis import MotionCut, MotionEnded
+from detent.cell.recording import Span
+from detent.controllers.device import Executing, Powered
+from detent.outputs.signals import Pulses, Signals, UnitSignals
+from detent.outputs.waves import Levels, Wave
+from detent.pins import PinSet
+from detent.pulses import Accelerating, Uniform
+from detent.pulses.segment import Int64Array
+from detent.ticks import Fixed, Ns, round_fixed, to_fixed
+
+EXACT = 1_500  # so many pulses are drawn one by one
+MANY_SEGMENTS = 64  # of a train; beyond that it is sampled as a whole
+DENSE_LOOKS = 4  # motions of a column that are asked for their speed
+
+
+class Trace(NamedTuple):
+    """A curve: straight lines from point to point."""
+
+    times: Int64Array  # ns
+    values: npt.NDArray[np.float64]
+
+
+class Lane(NamedTuple):
+    """A logic level: from times[i] on it is levels[i]. Within `busy` it changes too often to be drawn."""
+
+    times: Int64Array
+    levels: Levels
+    busy: Sequence[tuple[Ns, Ns]]
+
+
+class Band(NamedTuple):
+    """Something that lasts, with a word for it."""
+
+    begin: Ns
+    end: Ns
+    label: str
+
+
+def position_trace(unit: UnitSignals, until: Ns, columns: int) -> Trace:
+    """The commanded position from 0 to `until`: a staircase if it has few steps."""
+    if unit.pulse_count <= EXACT:
+        pulses = unit.pulses(0, until + 1)
+        times = np.concatenate(([0], np.repeat(pulses.times, 2), [until]))
+        levels = np.concatenate(([unit.start], pulses.positions)).astype(np.float64)
+        return Trace(times, np.repeat(levels, 2))
+    grid = {until * k // columns for k in range(columns + 1)}
+    points: list[tuple[Ns, float]] = []
+    for group in _groups(unit.spans, until, columns):
+        if len(group) == 1:
+            grid |= {group[0].begins, group[0].ends}
+            continue
+        ends = [span.shaft + span.direction * n for span in group for n in (span.first - 1, span.last)]
+        points += [(group[0].begins, min(ends)), (group[0].begins, max(ends))]
+    points += [(t, unit.position(t)) for t in grid]
+    points.sort(key=lambda point: point[0])
+    return _trace(points)
+
+
+def speed_trace(unit: UnitSignals, until: Ns, columns: int) -> Trace:
+    """The speed with its sign, in steps/s, from 0 to `until`, by the laws of the trains; 0 at rest."""
+    points: list[tuple[Ns, float]] = [(0, 0.0)]
+    before: Ns | None = None  # the end of the motion before
+    for group in _groups(unit.spans, until, columns):
+        begin, end = group[0].begins, group[-1].ends
+        if before is not None and before != begin:
+            points.append((before, 0.0))
+        if before != begin:
+            points.append((begin, 0.0))
+        if len(group) == 1:
+            width = (end - begin) * columns // max(until, 1)
+            points += _law(group[0], width)
+        else:
+            looks = group[:: max(len(group) // DENSE_LOOKS, 1)]
+            speeds = [speed for span in looks for _, speed in _law(span, 0)]
+            points += [(begin, min(0.0, *speeds)), (begin, max(0.0, *speeds)), (end, 0.0)]
+        before = end
+    if before is None or before < until:
+        points += [(until if before is None else before, 0.0), (until, 0.0)]
+    return _trace(points)
+
+
+def envelope(trace: Trace, until: Ns, columns: int) -> tuple[Trace, Trace]:
+    """The lowest and the highest value of a curve in each column, 0 .. columns, for one that bends too often."""
+    edges = np.array([until * k // columns for k in range(columns + 1)], np.int64)
+    through = np.interp(edges, trace.times, trace.values)
+    low, high = through.copy(), through.copy()
+    column = np.searchsorted(edges, trace.times, side="right") - 1
+    np.minimum.at(low, column, trace.values)
+    np.maximum.at(high, column, trace.values)
+    return Trace(edges, low), Trace(edges, high)
+
+
+def lane(unit: UnitSignals, pin: str, until: Ns, columns: int) -> Lane:
+    """The level of a pin from 0 to `until`; of what happens at 0 only the outcome."""
+    before = unit.level_before(pin, 1)
+    busy: list[tuple[Ns, Ns]] = []
+    if pin in unit.unlogged and unit.pulse_count > EXACT:
+        wave = unit.wave(pin, 1, pulses=_NO_PULSES)
+        busy = _busy_with_pulses(unit, pin, until, columns)
+    else:
+        wave, busy = _thinned(unit.wave(pin, 1), until, columns)
+    times = np.concatenate((np.zeros(1, np.int64), wave.times))
+    levels = np.concatenate((np.array([before], np.uint8), wave.levels))
+    return Lane(times, levels, busy)
+
+
+def instructions(signals: Signals, name: str) -> list[Band]:
+    """What the unit's program executed, and how long.
+
+    An instruction lasts to the next one; the last one to the last thing that it did, or to the end of the run
+    if it moves still, or has done nothing.
+    """
+    bands: list[Band] = []
+    current: Executing | None = None
+    last: Ns = 0
+    for entry in signals.recording.of(name):
+        if entry.at > signals.until:
+            break
+        match entry:
+            case Executing():
+                if current is not None:
+                    bands.append(Band(current.at, entry.at, current.instruction))
+                current, last = entry, entry.at
+            case Powered(at, False) if current is not None:
+                bands.append(Band(current.at, at, current.instruction))
+                current = None
+            case PinSet() | MotionCut() | MotionEnded():
+                last = entry.at
+    if current is not None:
+        spans = signals.unit(name).spans
+        moves = bool(spans) and spans[-1].ends == signals.until
+        end = signals.until if moves or last == current.at else last
+        bands.append(Band(current.at, end, current.instruction))
+    return bands
+
+
+_NO_PULSES = Pulses(*[np.empty(0, np.int64)] * 3)
+
+
+def _trace(points: Sequence[tuple[Ns, float]]) -> Trace:
+    return Trace(np.array([t for t, _ in points], np.int64), np.array([value for _, value in points], np.float64))
+
+
+def _groups(spans: Sequence[Span], until: Ns, columns: int) -> Iterator[Sequence[Span]]:
+    """The motions one by one, but those that lie within one column together."""
+    if not spans:
+        return
+    begins = np.array([span.begins for span in spans]) * (columns / (until + 1))
+    ends = np.array([span.ends for span in spans]) * (columns / (until + 1))
+    first, last = begins.astype(np.int64), ends.astype(np.int64)
+    apart = (first[1:] != first[:-1]) | (first[1:] != last[1:]) | (first[:-1] != last[:-1])
+    cuts = [0, *(np.flatnonzero(apart) + 1).tolist(), len(spans)]
+    for low, high in pairwise(cuts):
+        yield spans[low:high]
+
+
+def _law(span: Span, width: int) -> Iterator[tuple[Ns, float]]:
+    """Times and speeds of a motion that is `width` columns wide, from its begin to its end."""
+    train, begin, end = span.train, to_fixed(span.begins), to_fixed(span.ends)
+    if len(train.segments) > MANY_SEGMENTS:
+        points = max(width, 5)
+        for k in range(points):
+            t = span.begins + (span.ends - span.begins) * k // (points - 1)
+            yield t, span.direction * train.state_at(t).rate
+        return
+    for segment in train.segments:
+        low = max(train.start + segment.begin, begin)
+        high = end if segment.end is None else min(train.start + segment.end, end)
+        if low >= high:
+            continue
+        linear = isinstance(segment, Uniform | Accelerating)  # in time
+        points = 2 if linear else min(max((high - low) * width // max(end - begin, 1), 4), 1_000)
+        for k in range(points):
+            at: Fixed = low + (high - low) * k // (points - 1)
+            yield round_fixed(at), span.direction * segment.progress(at - train.start)[1]
+
+
+def _busy_with_pulses(unit: UnitSignals, pin: str, until: Ns, columns: int) -> list[tuple[Ns, Ns]]:
+    """The columns in which the pin carries a pulse, joined."""
+    output = unit.view.pulse_output
+    assert output is not None
+    spans = [span for span in unit.spans if output.pins.get(span.direction) == pin]
+    counts = [0]
+    for span in spans:
+        counts.append(counts[-1] + span.last - span.first + 1)
+    begins = [span.begins for span in spans]
+
+    def by(t: Ns) -> int:
+        index = bisect_right(begins, t) - 1
+        if index < 0:
+            return 0
+        span = spans[index]
+        return counts[index] + min(max(span.train.steps_by(t), span.first - 1), span.last) - span.first + 1
+
+    busy: list[tuple[Ns, Ns]] = []
+    before = 0
+    for k in range(columns):
+        low, high = until * k // columns, until * (k + 1) // columns
+        now = by(high)
+        if now > before:
+            if busy and busy[-1][1] == low:
+                low = busy.pop()[0]
+            busy.append((low, high))
+        before = now
+    return busy
+
+
+def _thinned(wave: Wave, until: Ns, columns: int) -> tuple[Wave, list[tuple[Ns, Ns]]]:
+    """The changes without those in columns that have more than two, and where these are."""
+    if not len(wave.times):
+        return wave, []
+    column = (wave.times * (columns / (until + 1))).astype(np.int64)
+    _, where, counts = np.unique(column, return_inverse=True, return_counts=True)
+    crowded = counts[where] > 2
+    # a run of crowded columns is one busy stretch; its last change tells the level behind it
+    begins = crowded & ~np.concatenate(([False], crowded[:-1] & (np.diff(column) <= 1)))
+    ends = crowded & ~np.concatenate((crowded[1:] & (np.diff(column) <= 1), [False]))
+    busy = list(zip(wave.times[begins].tolist(), wave.times[ends].tolist(), strict=True))
+    return wave.where(~crowded | ends), busy

@@ -1,0 +1,61 @@
+"""Endpoints as they are asked for in a cell file or on the command line."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from detent.realtime.endpoints.endpoint import Endpoint
+from detent.realtime.endpoints.pty import PseudoTerminal
+from detent.realtime.endpoints.serialport import SerialPort
+from detent.realtime.endpoints.tcp import TcpAddress, TcpPort
+from detent.uart import Format
+
+
+class Wanted(NamedTuple):
+    """An endpoint of some kind, and where: a link or nothing for a pty, HOST:PORT for tcp, a device for serial."""
+
+    kind: str
+    where: str = ""
+
+    @classmethod
+    def parse(cls, text: str) -> "Wanted":
+        """Read ``pty``, ``pty:LINK``, ``tcp:HOST:PORT`` or ``serial:DEVICE``. Raises ValueError."""
+        kind, _, where = text.partition(":")
+        if kind not in ("pty", "tcp", "serial") or (kind != "pty" and not where):
+            raise ValueError(f"{text!r} is no endpoint; write pty, pty:LINK, tcp:HOST:PORT or serial:DEVICE")
+        return cls(kind, where).checked()
+
+    def checked(self) -> "Wanted":
+        """Itself, if `where` can be understood. Raises ValueError."""
+        if self.kind == "tcp":
+            TcpAddress.parse(self.where)
+        return self
+
+    def of_several(self, number: int, name: str) -> "Wanted":
+        """The same for line `number`, called `name`, of several.
+
+        A link gets the name appended; ports other than 0 count up. Raises ValueError if it cannot be shared out.
+        """
+        if self.kind == "pty" and self.where:
+            return self._replace(where=f"{self.where}-{name}")
+        if self.kind == "tcp":
+            address = TcpAddress.parse(self.where)
+            port = address.port and address.port + number
+            if port > 65535:
+                raise ValueError(f"{self.where}: no port is left for line {name}; begin lower, or use port 0")
+            return self._replace(where=str(address._replace(port=port)))
+        if self.kind == "serial":
+            raise ValueError(
+                f"{self.where} is one wire and the cell has several lines; "
+                "give one of them endpoint = 'serial:DEVICE' in the cell file"
+            )
+        return self
+
+    def open(self, name: str, form: Format) -> Endpoint:
+        """The endpoint, for the line `name` with characters of `form`. Raises EndpointError."""
+        match self.kind:
+            case "pty":
+                return PseudoTerminal(Path(self.where) if self.where else None)
+            case "tcp":
+                return TcpPort(TcpAddress.parse(self.where), name)
+            case _:
+                return SerialPort(self.where, form)

@@ -1,0 +1,127 @@
+"""Every cell of `examples/`, run, with what its comments promise."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from detent.cell.build import build
+from detent.cell.cell import Cell
+from detent.cell.description import parse
+from detent.outputs.signals import UnitSignals, of_cell
+from detent.ticks import MS, SECOND, Ns
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def example(name: str, **replaced: str) -> Cell:
+    """The cell of an example; `replaced` are texts put in place of others (`old=new`), for a comparison."""
+    folder = EXAMPLES / name
+    text = (folder / "cell.toml").read_text()
+    for old, new in replaced.items():
+        assert old in text
+        text = text.replace(old, new)
+    return build(parse(text, f"{name}/cell.toml"), lambda file: (folder / file).read_text())
+
+
+def run(cell: Cell) -> Cell:
+    """The cell when nothing is left to do."""
+    while cell.step() is not None:
+        pass
+    return cell
+
+
+def seen(cell: Cell, unit: str) -> UnitSignals:
+    return of_cell(cell).unit(unit)
+
+
+def positions(cell: Cell) -> dict[str, int]:
+    return {name: unit.status(cell.now).position for name, unit in cell.controllers().items()}
+
+
+def pulses(cell: Cell, unit: str) -> list[Ns]:
+    """The times of all pulses of a unit."""
+    return seen(cell, unit).pulses(0, cell.now + 1).times.tolist()
+
+
+def test_no_example_is_without_a_test() -> None:
+    tested = {"closed-loop", "drilling", "homing", "menu", "multipoint", "synchronised", "velocity"}
+    assert {path.parent.name for path in EXAMPLES.glob("*/cell.toml")} == tested
+
+
+def test_drilling_serves_five_holes_and_cuts() -> None:
+    cell = run(example("drilling"))
+    assert positions(cell) == {"bar": 980, "drill": 0}  # 250 + 4 * 120 + 250
+    assert len(pulses(cell, "drill")) == 5 * 2 * 150
+
+
+class TestClosedLoop:
+    def test_a_motor_that_hesitates_stretches_the_move_and_loses_no_pulse(self) -> None:
+        healthy = pulses(run(example("closed-loop", **{"slow_to = 420": "slow_to = 0"})), "axis")
+        hesitant = pulses(run(example("closed-loop")), "axis")
+        assert len(healthy) == len(hesitant) == 1000
+        assert hesitant[:401] == healthy[:401]
+        assert {after - before for before, after in pairwise(hesitant[400:421])} == {5 * MS}
+        # behind the hesitation the old intervals: 20 steps took 5 ms instead of 1 ms
+        assert [t - 20 * 4 * MS for t in hesitant[421:]] == pytest.approx(healthy[421:], abs=1)  # rounded anew
+
+    def test_a_healthy_motor_changes_nothing(self) -> None:
+        open_loop = example("closed-loop", **{'to = "axis.ENABLE"': 'to = "axis.UI3"'})
+        closed = example("closed-loop", **{"slow_to = 420": "slow_to = 0"})
+        assert pulses(run(closed), "axis") == pulses(run(open_loop), "axis")
+
+
+def test_modules_on_one_enable_line_stop_and_go_on_together() -> None:
+    cell = run(example("synchronised"))
+    assert positions(cell) == {"x": 1000, "y": 400}
+    free = run(example("synchronised", **{"set = { go = 0 }": "set = { go = 1 }"}))
+    for unit in ("x", "y"):
+        times, without = pulses(cell, unit), pulses(free, unit)
+        held = next(n for n, t in enumerate(times) if t >= 400 * MS)
+        assert times[:held] == without[:held]
+        assert times[held] == 900 * MS  # the pulse that fell due meanwhile, at the moment ENABLE rises
+        late = 900 * MS - without[held]
+        assert [t - late for t in times[held:]] == pytest.approx(without[held:], abs=1)  # rounded anew
+
+
+def test_seven_modules_on_one_line_each_obey_their_own_commands() -> None:
+    cell = run(example("multipoint"))
+    assert positions(cell) == {f"u{n}": 100 * n for n in range(1, 8)}
+    heard = bytes(h.char.value for h in cell.lines[0].take())
+    assert cell.controller("u1").answers(heard) == ["Y"] * 7
+
+
+def test_a_module_without_host_homes_and_runs_its_stored_program() -> None:
+    cell = run(example("homing"))
+    assert positions(cell) == {"slide": 0}
+    slide = seen(cell, "slide")
+    up, back = 300 - 120, 300
+    homed = pulses(cell, "slide")[up + back - 1]
+    assert slide.position(homed) == 0
+    intervals = {b - a for a, b in pairwise(pulses(cell, "slide")[:up])}
+    assert intervals == {SECOND // 200}  # S20, the first S of the program
+    # G+2: 250 pulses until the sensor, one that keeps its time, then a ramp of 60; and the same way back
+    assert len(pulses(cell, "slide")) == up + back + 2 * (250 + 1 + 60)
+    assert slide.position(pulses(cell, "slide")[up + back + 311 - 1]) == 311
+
+
+def test_buttons_choose_what_is_executed() -> None:
+    cell = example("menu")
+    cell.run_to(2 * SECOND)
+    assert positions(cell) == {"table": 800}
+    cell.run_to(6 * SECOND)
+    assert positions(cell) == {"table": 200}
+    reached = seen(cell, "table").wave("UO1")
+    assert reached.levels.tolist()[-4:] == [1, 0, 1, 0]
+    assert cell.controller("table").status(cell.now).state == "running"  # the menu waits for the next button
+
+
+def test_the_belt_stops_one_ramp_behind_each_mark() -> None:
+    cell = run(example("velocity"))
+    belt = seen(cell, "belt")
+    for mark in (1.0, 2.5, 4.0):
+        at = round(mark * SECOND)
+        stopped = belt.position(at + 150 * MS)
+        assert stopped == belt.position(at + 200 * MS)
+        assert stopped - belt.position(at) == 1 + 40  # the pulse that keeps its time, and R
+    assert positions(cell) == {"belt": belt.position(cell.now)}
