@@ -81,9 +81,10 @@ def _lateness() -> int:
     """99th percentile in ns of a module that executes an instruction a millisecond."""
     with Service(single("gs-c200", straps={"CHS": "low"}), _no_file) as service:
         # a program without an end: 1 ms an instruction
-        for line in ("P", "A0", "A7", "j0", "E"):
+        for line in ("P", "A1", "C1", "U1", "E"):
             service.cell.type("gs-c200", line)
             service.cell.run_to(service.cell.now + 100_000_000)
+        assert service.cell.next_event() is not None
         service.restart_clock()
         wake_exactly()
         end = time.monotonic() + LATENESS_SECONDS

@@ -1,4 +1,4 @@
-"""What every wire must carry, worked out pulse by pulse and bit by bit: slow, and independent of the code under test."""
+"""What every wire must carry, worked out pulse by pulse and bit by bit: slow, and not with the code under test."""
 
 from fractions import Fraction
 
@@ -45,7 +45,7 @@ def level_changes(recording: Recording, view: UnitView, until: int) -> dict[str,
     output = view.pulse_output
     if output is not None:
         given = pulses(recording, view.name, until)
-        for (t, direction, _), follower in zip(given, [*given[1:], (1 << 90, 0, 0)], strict=True):
+        for (t, direction, _), follower in zip(given, [*given[1:], (1 << 90, 0, 0)], strict=False):
             pin = output.pins[direction]
             changes.setdefault(pin, []).append((t, -1, output.active))
             end = t + output.width

@@ -2,8 +2,8 @@ import json
 
 import numpy as np
 import pytest
-from expected import level_changes, pulses, settled
-from recorded import BAR, DRILL, drilling, interrupted
+from tests.outputs.expected import level_changes, pulses, settled
+from tests.outputs.recorded import BAR, DRILL, drilling, interrupted
 
 from detent.cell.recording import Recording
 from detent.outputs import arrays

@@ -1,9 +1,11 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
-from expected import level_changes, pulses, settled
 from hypothesis import given
 from hypothesis import strategies as st
-from recorded import BAR, CLOCK, DRILL, FORM, PINS, drilling, interrupted, moved, said
+from tests.outputs.expected import level_changes, pulses, settled
+from tests.outputs.recorded import BAR, CLOCK, DRILL, FORM, PINS, drilling, interrupted, moved, said
 
 from detent.axis import MotionStarted
 from detent.cell.recording import InputSet, Received, Recording
@@ -12,6 +14,7 @@ from detent.outputs.signals import Signals
 from detent.outputs.units import UnitView
 from detent.outputs.waves import UNKNOWN, Spoken, serial_wave
 from detent.pins import LOW, Pin, PinKind, PinSet, PulseOutput
+from detent.ramps.constant_acceleration import move
 from detent.ticks import MS, SECOND
 from detent.uart import Char, Format
 
@@ -51,7 +54,7 @@ def test_windows_of_any_size_join_to_the_same_waves(limit, until):
     windows = list(signals.windows(limit))
     assert windows[0][0] == 0
     assert windows[-1][1] == until + 1
-    assert all(one[1] == other[0] for one, other in zip(windows, windows[1:], strict=False))
+    assert all(one[1] == other[0] for one, other in pairwise(windows))
     pieces = [unit.wave("CLOCK", begin, end, unit.pulses_for(begin, end)) for begin, end in windows]
     whole = unit.wave("CLOCK")
     assert np.concatenate([piece.times for piece in pieces]).tolist() == whole.times.tolist()
@@ -104,8 +107,6 @@ def test_pulses_that_a_wire_carries_are_taken_from_the_recording_and_not_made_tw
 
 def test_an_endless_motion_is_drawn_to_the_end_of_the_run():
     recording = Recording(["bar"])
-    from detent.ramps.constant_acceleration import move
-
     recording.extend(0, [Powered(0, True), MotionStarted(0, move(1000, 1000, 1, None).train, 1, -1, 7)])
     unit = Signals(recording, [BAR], 10 * MS).unit("bar")
     assert unit.pulse_count == 10

@@ -6,8 +6,8 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from expected import level_changes, pulses
-from recorded import BAR, DRILL, drilling, heard, interrupted, moved
+from tests.outputs.expected import level_changes, pulses
+from tests.outputs.recorded import BAR, DRILL, drilling, heard, interrupted, moved
 
 from detent.cell.recording import Recording
 from detent.controllers.device import Powered
@@ -135,7 +135,7 @@ def test_sigroks_own_decoder_reads_the_characters(tmp_path):
     sigrok.write(path, Signals(recording, [BAR], 20 * MS))
     options = "uart:rx=bar.RXD:baudrate=9600:data_bits=7:parity=odd:stop_bits=2:format=hex"
     assert decoded(path, "-P", options, "-A", "uart=rx-data") == [f"{ord(c):02X}" for c in "+300t\r"]
-    warnings = "uart=rx-parity-err:rx-warning"
+    warnings = "uart=rx-parity-err:rx-warnings"
     assert decoded(path, "-P", options, "-A", warnings) == []
 
 

@@ -1,8 +1,8 @@
 from io import StringIO
 
 import pytest
-from expected import level_changes, pulses, settled
-from recorded import BAR, DRILL, drilling, interrupted, moved
+from tests.outputs.expected import level_changes, pulses, settled
+from tests.outputs.recorded import BAR, DRILL, drilling, interrupted, moved
 
 from detent.cell.recording import Recording
 from detent.controllers.device import Powered

@@ -197,7 +197,8 @@ class _Builder:
         for found in wired:
             if found.name == pin:
                 return _End(self.names.index(name), found, text)
-        raise self.problem(key, str(catalogue.unknown(f"pin of {name} that takes a wire", pin, [p.name for p in wired])))
+        known = [found.name for found in wired]
+        raise self.problem(key, str(catalogue.unknown(f"pin of {name} that takes a wire", pin, known)))
 
     def join(self, key: str, one: _End, other: _End) -> None:
         """Put both pins on one net, with everything that is on theirs."""

@@ -7,34 +7,39 @@ FAILED = 1
 ASKED_WRONGLY = 2
 
 VERBS = {
-    "demo": "detent.cli.demo:demo",
-    "models": "detent.cli.models:models",
-    "serve": "detent.cli.serve:serve",
-    "run": "detent.cli.run:run",
-    "asm": "detent.cli.assemble:asm",
-    "list": "detent.cli.assemble:list_",
-    "disasm": "detent.cli.assemble:disasm",
+    "demo": ("detent.cli.demo:demo", "Run an example cell, tell what happens, and draw it."),
+    "models": ("detent.cli.models:models", "List the controllers, or show one with all its tables."),
+    "serve": ("detent.cli.serve:serve", "Serve a controller or a cell in real time, until Ctrl-C."),
+    "run": ("detent.cli.run:run", "Run a controller or a cell in virtual time and say where everything ended."),
+    "asm": ("detent.cli.assemble:asm", "Assemble a program: labels and comments in, commands or an image out."),
+    "list": ("detent.cli.assemble:list_", "List a program source with the address and bytes of every instruction."),
+    "disasm": ("detent.cli.assemble:disasm", "Turn a program image back into source, with labels for its jumps."),
 }
+"""Each verb's function, and its first line of help, which `detent --help` shows without importing the function."""
 
 
 def main(tokens: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0, 1 (it failed), 2 (it was asked wrongly)."""
-    from cyclopts import App, CycloptsError
+    from cyclopts import App, CycloptsError, Parameter
 
     import detent
 
+    given = list(sys.argv[1:] if tokens is None else tokens)
     app = App(
         name="detent",
         help="Intelligent stepper motor controllers in software, exact to the pulse.",
         version=detent.__version__,
+        default_parameter=Parameter(negative=(), show_default=False),
         exit_on_error=False,
         print_error=True,
     )
-    for name, place in VERBS.items():
-        app.command(place, name=name)
+    for place, (name, (function, line)) in enumerate(VERBS.items()):
+        # A help text given here would replace the function's own, which the verb's --help shows whole.
+        short = {} if name in given[:1] else {"help": line}
+        app.command(function, name=name, sort_key=place, **short)
     app.register_install_completion_command()
     try:
-        app(tokens)
+        app(given)
     except CycloptsError:
         sys.exit(ASKED_WRONGLY)
     except KeyboardInterrupt:

@@ -29,7 +29,7 @@ def asm(
     format: Literal["image", "hex", "commands"] | None = None,
     json: bool = False,
 ) -> None:
-    """Assemble a program: commands with labels and comments in, commands for the wire or an image out.
+    """Assemble a program: labels and comments in, commands or an image out.
 
     The source has one command a line as typed on the wire, `label:` where a jump leads, and `;` before
     a comment. The commands are printed with their addresses filled in, and how much memory they take.
@@ -63,7 +63,7 @@ def asm(
 
 
 def list_(model: str, file: Path, *, json: bool = False) -> None:
-    """List a program source with the address, length and bytes of every instruction.
+    """List a program source with the address and bytes of every instruction.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def list_(model: str, file: Path, *, json: bool = False) -> None:
 
 
 def disasm(model: str, file: Path, *, output: Path | None = None, json: bool = False) -> None:
-    """Turn a program image back into source, with a label wherever a jump leads.
+    """Turn a program image back into source, with labels for its jumps.
 
     Parameters
     ----------

@@ -8,7 +8,9 @@ if TYPE_CHECKING:
 
 
 def models(model: str | None = None, *, json: bool = False, markdown: bool = False) -> None:
-    """List the controllers, or show one: its pins, straps, options and commands.
+    """List the controllers, or show one with all its tables.
+
+    The tables are its pins, straps, options and commands.
 
     Parameters
     ----------

@@ -144,7 +144,10 @@ class Controller(Device, Protocol):
         """Put `image` into non-volatile memory, before the first power-on. Raises `detent.assembler.ImageError`."""
 
     def load(self, image: bytes, base: int, now: Ns) -> None:
-        """Put a program image into program memory from address `base` on, as if a host had sent it. Raises `detent.assembler.ImageError`."""
+        """Put a program image into program memory from address `base` on, as if a host had sent it.
+
+        Raises `detent.assembler.ImageError`.
+        """
 
     def start(self, now: Ns) -> None:
         """Start the program in memory, as if a host had asked for it."""

@@ -223,6 +223,5 @@ def _clipped(spans: Sequence[Span], until: Ns) -> list[Span]:
             break
         if span.ends > until:
             span = span._replace(ends=until, last=min(span.last, span.train.steps_by(until)))
-        if span.last >= span.first:
-            clipped.append(span)
+        clipped.append(span)
     return clipped

@@ -200,7 +200,10 @@ class GsC200:
         self._eeprom = program.from_image(self.model, image)
 
     def load(self, image: bytes, base: int, now: Ns) -> None:
-        """Put `image` into RAM, where programs start at address 0, as P and its instructions would. Raises `detent.assembler.ImageError`."""
+        """Put `image` into RAM, as P and its instructions would; programs start at address 0.
+
+        Raises `detent.assembler.ImageError`.
+        """
         self.advance(now)
         self._ram = program.from_image(self.model, image)
 

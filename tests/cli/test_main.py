@@ -1,0 +1,48 @@
+"""The command as a whole: help, exit status, what it says to a wrong call."""
+
+import subprocess
+import sys
+from importlib import import_module
+from inspect import getdoc
+
+import pytest
+
+from detent.cli import VERBS, main
+
+
+def status(*tokens: str) -> int | str | None:
+    with pytest.raises(SystemExit) as caught:
+        main(tokens)
+    return caught.value.code
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_the_line_that_help_shows_is_the_first_of_the_verbs_own_help(name: str) -> None:
+    place, line = VERBS[name]
+    module, function = place.split(":")
+    doc = getdoc(getattr(import_module(module), function))
+    assert doc is not None
+    assert doc.splitlines()[0] == line
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_every_verb_has_help_and_offers_json(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert status(name, "--help") == 0
+    assert "--json" in capsys.readouterr().out
+
+
+def test_a_wrong_call_exits_with_2_and_names_the_verb_that_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
+    assert status("modles") == 2
+    assert 'Did you mean "models"?' in capsys.readouterr().err
+
+
+def test_help_imports_neither_numpy_nor_the_controllers() -> None:
+    code = (
+        "import sys; from detent.cli import main\n"
+        "try: main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'pydantic', 'matplotlib', 'numba', 'detent.controllers'} & set(sys.modules)\n"
+        "sys.exit(', '.join(sorted(heavy)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
