@@ -113,7 +113,7 @@ def test_waveforms_arrays_and_figures_are_written(tmp_path: Path, capsys: pytest
         (["gs-c200", "--set", "revison=2.1"], "no option of the gs-c200 'revison'; did you mean revision?"),
         (["gs-c200", "--set", "instruction_time=1"], ""),
         (["gs-c200", "--set", "instruction_time=0"], "instruction_time cannot be '0'; it takes a duration of at least"),
-        (["gs-c200", "--for", "soon"], "--for: 'soon' is no duration: write it like"),
+        (["gs-c200", "--for", "soon"], "'soon' is no duration: write it like"),
         (["gs-c200", "--program", "none.gsc"], "program: cannot read none.gsc: No such file or directory"),
         ([DRILLING, "--send", "F"], "a cell has several units, write UNIT:LINE"),
         ([DRILLING, "--send", "bra:F"], "no unit 'bra'; did you mean bar?"),

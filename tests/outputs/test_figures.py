@@ -5,7 +5,7 @@ from tests.outputs.recorded import BAR, DRILL, drilling, interrupted, moved
 
 from detent.axis import MotionCut, MotionStarted
 from detent.cell.recording import Recording
-from detent.controllers.device import Executing, Powered
+from detent.controllers.device import Executing, Finished, Powered
 from detent.outputs import curves, figures
 from detent.outputs.curves import Band
 from detent.outputs.figures import Pin, Strip
@@ -152,9 +152,9 @@ def test_changes_too_quick_for_a_column_make_one_busy_stretch_and_the_level_behi
     assert lane.times.tolist() == [0, begin + MS]
 
 
-def test_an_instruction_lasts_to_the_next_one_and_the_last_to_what_it_did_last():
+def test_an_instruction_lasts_to_the_next_one_and_the_last_to_the_end_of_the_program():
     recording = Recording(["bar"])
-    recording.extend(0, [Executing(0, 0, "W1"), Executing(5, 2, "A1"), PinSet(5, "UO1", 1), PinSet(9, "RDY", 1)])
+    recording.extend(0, [Executing(0, 0, "W1"), Executing(5, 2, "A1"), PinSet(5, "UO1", 1), Finished(9)])
     assert curves.instructions(Signals(recording, [BAR], 20), "bar") == [Band(0, 5, "W1"), Band(5, 9, "A1")]
 
 

@@ -15,7 +15,7 @@ from detent.assembler import (
     disassemble,
     listing,
 )
-from detent.realtime.files import write_whole
+from detent.outputs.files import write_whole
 
 FAILED = 1
 ASKED_WRONGLY = 2

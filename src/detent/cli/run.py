@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 if TYPE_CHECKING:
     from detent.cell.cell import Cell
+    from detent.cli.target import Target
     from detent.ticks import Ns
 
 MOST_INSTANTS = 500_000  # eventful instants without --for, after which a cell counts as endless
@@ -67,25 +68,28 @@ def run(
     from detent.cell.description import Problem
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
+    from detent.outputs.figures import check
     from detent.ticks import parse_duration
 
     try:
         found = find(target, straps=strap, options=set_, programs=program)
         until = None if for_ is None else parse_duration(for_)
+        if plot is not None:
+            check(plot)
         wanted = [path for path in (plot, vcd, sr, npz) if path is not None]
         cell = build(found.description, found.read, record=bool(wanted), line_timing=line_timing)
         lines = [_addressed(cell, text) for text in send]
     except Problem as error:
         asked_wrongly(error)
     except ValueError as error:
-        asked_wrongly(ValueError(f"--for: {error}"))
+        asked_wrongly(error)
     try:
         exchanges = [_exchange(cell, unit, text) for unit, text in lines]
         ended = _run_on(cell, until)
     except Oscillation as error:
         failed(error)
     try:
-        _write(cell, found.description.title or found.name, plot=plot, vcd=vcd, sr=sr, npz=npz)
+        _write(cell, found, plot=plot, vcd=vcd, sr=sr, npz=npz)
     except ValueError as error:
         asked_wrongly(error)
     except OSError as error:
@@ -150,14 +154,15 @@ def _run_on(cell: "Cell", until: "Ns | None") -> str:
 
 
 def _write(
-    cell: "Cell", title: str, *, plot: Path | None, vcd: Path | None, sr: Path | None, npz: Path | None
+    cell: "Cell", target: "Target", *, plot: Path | None, vcd: Path | None, sr: Path | None, npz: Path | None
 ) -> None:
     """Write the files that are wanted. Raises ValueError for a wrong choice, OSError."""
     if plot is None and vcd is None and sr is None and npz is None:
         return
     from detent.outputs import signals
 
-    seen = signals.of_cell(cell)
+    described = target.description
+    seen = signals.of_cell(cell, {name: unit.shaft for name, unit in described.units.items()})
     if vcd is not None:
         from detent.outputs import vcd as vcd_file
 
@@ -173,7 +178,7 @@ def _write(
     if plot is not None:
         from detent.outputs import figures
 
-        figures.write(plot, seen, title=title)
+        figures.write(plot, seen, title=described.title or target.name)
 
 
 def result(cell: "Cell", ended: str, exchanges: list[Exchange]) -> dict[str, object]:

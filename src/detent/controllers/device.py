@@ -29,6 +29,12 @@ class Executing(NamedTuple):
     instruction: str
 
 
+class Finished(NamedTuple):
+    """The program, or the command that took time, is over."""
+
+    at: Ns
+
+
 class Refused(NamedTuple):
     """A frame or command was turned down: what it was, and why, in words."""
 
@@ -52,7 +58,7 @@ class Powered(NamedTuple):
 
 
 Output: TypeAlias = (
-    Sent | PinSet | MotionStarted | MotionCut | MotionEnded | Executing | Refused | StoreImage | Powered
+    Sent | PinSet | MotionStarted | MotionCut | MotionEnded | Executing | Finished | Refused | StoreImage | Powered
 )
 
 

@@ -12,12 +12,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from detent.axis import MotionCut, MotionEnded
 from detent.cell.recording import Span
-from detent.controllers.device import Executing, Powered
+from detent.controllers.device import Executing, Finished, Powered
 from detent.outputs.signals import Pulses, Signals, UnitSignals
 from detent.outputs.waves import Levels, Wave
-from detent.pins import PinSet
 from detent.pulses import Accelerating, Uniform
 from detent.pulses.segment import Int64Array
 from detent.ticks import Fixed, Ns, round_fixed, to_fixed
@@ -121,12 +119,10 @@ def lane(unit: UnitSignals, pin: str, until: Ns, columns: int) -> Lane:
 def instructions(signals: Signals, name: str) -> list[Band]:
     """What the unit's program executed, and how long.
 
-    An instruction lasts to the next one; the last one to the last thing that it did, or to the end of the run
-    if it moves still, or has done nothing.
+    An instruction lasts to the next one, or to the end of the program, of the supply, or of the run.
     """
     bands: list[Band] = []
     current: Executing | None = None
-    last: Ns = 0
     for entry in signals.recording.of(name):
         if entry.at > signals.until:
             break
@@ -134,17 +130,12 @@ def instructions(signals: Signals, name: str) -> list[Band]:
             case Executing():
                 if current is not None:
                     bands.append(Band(current.at, entry.at, current.instruction))
-                current, last = entry, entry.at
-            case Powered(at, False) if current is not None:
+                current = entry
+            case (Finished(at) | Powered(at, False)) if current is not None:
                 bands.append(Band(current.at, at, current.instruction))
                 current = None
-            case PinSet() | MotionCut() | MotionEnded():
-                last = entry.at
     if current is not None:
-        spans = signals.unit(name).spans
-        moves = bool(spans) and spans[-1].ends == signals.until
-        end = signals.until if moves or last == current.at else last
-        bands.append(Band(current.at, end, current.instruction))
+        bands.append(Band(current.at, signals.until, current.instruction))
     return bands
 
 

@@ -24,14 +24,16 @@ class Load(NamedTuple):
 class Movement(NamedTuple):
     """What was planned. `train` starts at 0; `counts` are the N by entry, the low speed first.
 
-    The ramp up ends at pulse `up` and the ramp down begins at pulse `down`, the numbers na and nd of the paper;
-    both are 0 without a ramp, and `down` is `up` where a movement was cut short before.
+    `interval` is the one between the loads of the ramp down. The ramp up ends at pulse `up`, the ramp down begins
+    at pulse `down`: na and nd of the paper, both 0 without ramps and for a movement that was cut short.
     """
 
     train: Train
     counts: Sequence[int]
     loads: tuple[Load, ...]
     steps: int
+    clocks: int  # of the last pulse
+    interval: int = 0
     up: int = 0
     down: int = 0
 
@@ -44,7 +46,7 @@ def constant(n: int, steps: int) -> Movement:
     """`steps` pulses n + 1 clocks apart."""
     generator = RateGenerator(n)
     generator.run_to(steps)
-    return Movement(Train((generator.table(),)), (n,), (), steps)
+    return Movement(Train((generator.table(),)), (n,), (), steps, generator.at)
 
 
 @lru_cache(maxsize=1024)
@@ -74,31 +76,29 @@ def ramped(table: Differences, first: int, entries: int, steps: int, offset: int
     if generator.pulses > steps:
         raise ValueError(f"the table ends at pulse {generator.pulses} of {steps}: the offset {offset} is too small")
     generator.run_to(steps)
-    return Movement(Train((generator.table(),)), counts, tuple(loads), steps, up, down)
+    return Movement(Train((generator.table(),)), counts, tuple(loads), steps, generator.at, table.interval, up, down)
 
 
-def braked(movement: Movement, clock: int, interval: int | None) -> Movement:
+def braked(movement: Movement, clock: int, interval: int) -> Movement:
     """The movement cut short at `clock`: the table is run back from the entry in force then, a load every `interval`.
 
-    With `interval` None a ramp down that has begun goes on as it is, else the interval is that of the ramp. The
-    last pulse is the first that comes a whole period of low speed after the one before, or the last of the movement.
-    Loads due at `clock` itself have been made. A movement without a ramp ends with its running period.
+    A ramp down that has begun with an interval no longer than that goes on as it is. The last pulse is the first
+    after `clock` that comes a whole period of low speed after the one before it, or the last of the movement; without
+    a ramp, it is the pulse that ends the running period. A load due at `clock` itself has been made.
     """
-    made = [load for load in movement.loads if load.clock <= clock]
-    if interval is None and len(made) > len(movement.loads) // 2:
-        made = list(movement.loads)
-    else:
-        step = movement.loads[0].clock if interval is None and made else interval or 0
-        entry = made[-1].entry if made else 0
-        made += [Load(clock + i * step, entry - 1 - i) for i in range(entry)]
     counts = movement.counts
+    made = [load for load in movement.loads if load.clock <= clock]
+    if len(made) > len(movement.loads) // 2 and interval >= movement.interval:
+        made, interval = list(movement.loads), movement.interval
+    else:
+        entry = made[-1].entry if made else 0
+        made += [Load(clock + i * interval, entry - 1 - i) for i in range(entry)]
     generator = RateGenerator(counts[0])
     for at, entry in made:
         generator.load(at, counts[entry])
-    generator.load(max(clock, generator.at if len(made) and made[-1].clock > clock else clock), counts[0])
-    low = counts[0] + 1
-    if generator.rows[-1][1] != low:
+    generator.load(clock, counts[0])
+    if generator.rows[-1][1] != counts[0] + 1:
         generator.run_to(generator.pulses + 1)
-    steps = min(generator.pulses, movement.steps)
-    train = Train((generator.table(),)).head(steps)
-    return Movement(train, counts, tuple(made), steps, movement.up, movement.up)
+    if generator.pulses >= movement.steps:
+        return movement
+    return Movement(Train((generator.table(),)), counts, tuple(made), generator.pulses, generator.at, interval)

@@ -7,7 +7,7 @@ reached one instruction time later. What it waits for is explicit: `_timer`, a u
 from collections.abc import Callable
 from typing import ClassVar
 
-from detent.controllers.device import Executing, Output
+from detent.controllers.device import Executing, Finished, Output
 from detent.controllers.gsc200.commands import Instruction, Op
 from detent.controllers.gsc200.counter import PositionCounter
 from detent.controllers.gsc200.flow import Flow
@@ -143,6 +143,8 @@ class Running:
 
     def _end(self, now: Ns, error: int = 0) -> None:
         """The program, the move or the homing is over; an error waits for the next F."""
+        if self.busy:
+            self._out.append(Finished(now))
         self.busy = self._stopping = self._endless = False
         self.error = error or self.error
         self.after_homing = None

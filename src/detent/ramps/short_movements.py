@@ -1,0 +1,209 @@
+"""Movements too short for the whole table at its own first N, three ways; and how long each takes.
+
+`hyperbola` and `exact` run the whole table from a larger first N, a slower member of the family of curves that the
+table makes (the paper's figure 10). The paper computes that N by a hyperbola (figure 11), which must never be too
+small, and is therefore often too large; the exact way takes the member whose movement is shortest. `free` cuts the
+curve to the length instead: the first so many differences from the table's own first N, as a table compiled for
+the length would have them. The paper's firmware cannot do that, "since under no circumstance may a ramp be changed
+before it comes to an end".
+"""
+
+from collections.abc import Sequence
+from enum import Enum
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from detent.pulses.segment import Int64Array
+from detent.ramps.differences import LARGEST_N, PAPER, Differences
+from detent.ramps.table_movement import Movement, constant, ramped
+
+NEVER = np.iinfo(np.int64).max
+
+
+class Way(Enum):
+    """How the ramps of a short movement are chosen."""
+
+    HYPERBOLA = "hyperbola"
+    EXACT = "exact"
+    FREE = "free"
+
+
+class Ramp(NamedTuple):
+    """A choice: the first N, and how many differences of the table; none means constant speed."""
+
+    first: int
+    entries: int
+
+
+class Profiles(NamedTuple):
+    """Some ramps at once, a column each: what is the same for a movement of any length. Read only.
+
+    `up` is na and `up_clocks` the clock of the pulse behind it. The ramp down, from pulse nd to the end of the
+    period that runs at its last load, takes `down` pulses and `down_clocks`; where nd = na it begins with the load
+    that would be its first at the clock of the last load of the ramp up, and ends at `close_clocks`, `close` pulses
+    behind na. Periods are clocks.
+    """
+
+    first: Int64Array
+    entries: Int64Array
+    up: Int64Array
+    up_clocks: Int64Array
+    down: Int64Array
+    down_clocks: Int64Array
+    close: Int64Array
+    close_clocks: Int64Array
+    top: Int64Array
+    low: Int64Array
+
+    def __deepcopy__(self, _: Any) -> "Profiles":
+        return self
+
+    def clocks(self, steps: int, offset: int) -> Int64Array:
+        """The clock of the last pulse of a movement of `steps` with each; `NEVER` where two ramps do not fit."""
+        spare = steps - 2 * self.up - offset  # pulses at top speed, nd - na
+        far = self.up_clocks + (spare - 1) * self.top + self.down_clocks + (self.up + offset - self.down) * self.low
+        near = self.close_clocks + (self.up + offset - self.close) * self.low
+        result: Int64Array = np.where(spare > 0, far, near)
+        result[spare < 0] = NEVER
+        result[self.entries == 0] = steps * int(self.low[0])
+        return result
+
+
+def profiles(table: Differences, ramps: Sequence[Ramp]) -> Profiles:
+    """What `ramps` of a table come to; all of them have one first N, or one number of differences."""
+    first, entries = (np.array(column, np.int64) for column in zip(*ramps, strict=True))
+    taken = np.array(table.counts(0), np.int64)
+    up, up_clocks, loaded = np.zeros_like(first), np.zeros_like(first), first.copy()
+    for entry in range(1, int(entries.max()) + 1):
+        _load(up, up_clocks, loaded, np.full_like(first, entry * table.interval), first + taken[entry], entries >= entry)
+    end = entries * table.interval
+    far = [np.zeros_like(first), np.zeros_like(first), loaded.copy()]
+    near = [up.copy(), up_clocks.copy(), loaded.copy()]
+    for i in range(int(entries.max())):
+        valid = entries > i
+        n = first + taken[np.maximum(entries - 1 - i, 0)]
+        _load(*far, np.full_like(first, i * table.interval), n, valid)
+        _load(*near, end + i * table.interval, n, valid)
+    up -= entries > 0
+    return Profiles(first, entries, up, up_clocks, far[0], far[1], near[0] - up, near[1], loaded + 1, first + 1)
+
+
+def _load(
+    pulses: Int64Array, at: Int64Array, loaded: Int64Array, clock: Int64Array, n: Int64Array, valid: "np.ndarray[Any, Any]"
+) -> None:
+    """`RateGenerator.load` for each ramp that is `valid`, in place."""
+    runs = np.where(valid & (at <= clock), (clock - at) // (loaded + 1) + 1, 0)
+    pulses += runs
+    at += runs * (loaded + 1)
+    np.copyto(loaded, n, where=valid)
+
+
+@lru_cache(maxsize=32)
+def family(table: Differences, entries: int) -> Profiles:
+    """The members of the family of figure 10 with `entries` differences, from the table's own first N to the slowest
+    that can be of use: constant low speed does in the time of its two ramps what they do, and more.
+    """
+    idle = 2 * entries * table.interval // (table.first + 1)  # pulses at low speed in the time of two ramps
+    last, step = table.first, 256
+    while last < LARGEST_N and 2 * int(profiles(table, [Ramp(last, entries)]).up[0]) > idle:
+        last = min(last + step, LARGEST_N)
+    return profiles(table, [Ramp(first, entries) for first in range(table.first, last + 1)])
+
+
+@lru_cache(maxsize=32)
+def cuts(table: Differences, entries: int) -> Profiles:
+    """The table cut to its first 0, 1, ... up to `entries` differences."""
+    return profiles(table, [Ramp(table.first, count) for count in range(entries + 1)])
+
+
+@lru_cache(maxsize=32)
+def least_offset(table: Differences) -> int:
+    """The least offset with which the table ends no later than the pulses, whatever the length and the way."""
+    found = 0
+    for some in (family(table, len(table.differences)), cuts(table, len(table.differences))):
+        found = max(found, int((some.down - some.up).max()), int((some.close - some.up).max()))
+    return found
+
+
+class Hyperbola(NamedTuple):
+    """N0 = least integer not below base + area / (m - shift), where m steps are to be had for each ramp (figure 11)."""
+
+    base: int
+    area: int
+    shift: int
+
+    def first(self, m: int) -> int:
+        """The first N for ramps of at most `m` steps; `LARGEST_N` where the hyperbola has none."""
+        if m <= self.shift:
+            return LARGEST_N
+        return min(self.base - (-self.area // (m - self.shift)), LARGEST_N)
+
+
+PAPER_HYPERBOLA = Hyperbola(2870, 529_650, 10)
+
+
+@lru_cache(maxsize=32)
+def hyperbola(table: Differences) -> Hyperbola:
+    """One that never cuts a ramp of `table`, whatever the length. For the paper's table it is a given one.
+
+    For another the shift is 10 as well; of the bases from 0 to the table's first N, in 64 steps, the one is taken
+    that gives the smallest N all in all, each with the least area that will do.
+    """
+    if table == PAPER:
+        return PAPER_HYPERBOLA
+    members = family(table, len(table.differences))
+    # for ramps of m steps the first N must be one whose na is m at most: from each na on the least such N
+    most = int(members.up[0])
+    shift = 10
+    needed = [(m, int(members.first[np.argmax(members.up <= m)])) for m in range(max(int(members.up[-1]), shift + 1), most + 1)]
+    best: tuple[int, Hyperbola] | None = None
+    for i in range(64):
+        base = table.first * i // 64
+        area = max(((n - base) * (m - shift) for m, n in needed), default=0)
+        found = Hyperbola(base, max(area, 1), shift)
+        total = sum(found.first(m) for m, _ in needed)
+        if best is None or total < best[0]:
+            best = total, found
+    assert best is not None
+    return best[1]
+
+
+def choose(table: Differences, steps: int, offset: int, way: Way, entries: int) -> Ramp:
+    """The ramps of a movement of `steps` with no more than `entries` differences, by `way`.
+
+    A movement that has room for both of its ramps from the table's own first N gets them. A shorter one gets what
+    `way` says, and constant low speed where that is no slower. With fewer entries than the table has (a speed
+    limit) there is no hyperbola, and the exact way takes its place.
+    """
+    whole = Ramp(table.first, entries)
+    if entries == 0 or ramp_steps(table, whole) * 2 + offset <= steps:
+        return whole
+    if way is Way.HYPERBOLA and entries == len(table.differences):
+        found = Ramp(hyperbola(table).first((steps - offset) // 2), entries)
+        if 2 * ramp_steps(table, found) + offset > steps:
+            return Ramp(table.first, 0)
+        takes = ramped(table, found.first, entries, steps, offset).clocks
+        return found if takes < steps * (table.first + 1) else Ramp(table.first, 0)
+    some = cuts(table, entries) if way is Way.FREE else family(table, entries)
+    clocks = some.clocks(steps, offset)
+    at = int(clocks.argmin())
+    if int(clocks[at]) >= steps * (table.first + 1):
+        return Ramp(table.first, 0)
+    return Ramp(int(some.first[at]), int(some.entries[at]))
+
+
+@lru_cache(maxsize=1024)
+def ramp_steps(table: Differences, ramp: Ramp) -> int:
+    """The steps of a ramp, na."""
+    return int(profiles(table, [ramp]).up[0])
+
+
+@lru_cache(maxsize=1024)
+def movement(table: Differences, steps: int, offset: int, way: Way, entries: int) -> Movement:
+    """The movement of `steps` that `choose` comes to."""
+    ramp = choose(table, steps, offset, way, entries)
+    if ramp.entries == 0:
+        return constant(ramp.first, steps)
+    return ramped(table, ramp.first, ramp.entries, steps, offset)
