@@ -18,10 +18,10 @@ run: $(STAMP)
 	@.venv/bin/detent demo
 
 test: check system
-	$(PYTHON) -m pytest -n 2 --dist loadgroup -m "not slow" -rs
+	$(PYTHON) -m pytest -n 2 --dist loadgroup -rs
 
 test-all: check system
-	$(PYTHON) -m pytest -n 2 --dist loadgroup -rs
+	$(PYTHON) -m pytest -n 2 --dist loadgroup -m "slow or not slow" -rs
 
 check: $(STAMP)
 	.venv/bin/ruff check

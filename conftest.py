@@ -13,6 +13,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -28,7 +29,7 @@ import detent.cli
 ROOT = Path(__file__).parent
 PLAIN = re.compile(r"[^|&;<>$`*?~]+")  # a command that needs no shell
 FILE = re.compile(r"<!-- file: (?P<name>\S+) -->\n+```\w*\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
-BIN = ROOT / ".venv" / "bin"
+BIN = Path(sys.executable).parent
 
 
 def python(document: Document) -> Iterable[Region]:
@@ -73,11 +74,11 @@ def _run(command: str) -> tuple[int, str]:
     if words[:1] == ["detent"]:  # in this process, as a process of its own takes a second
         return _detent(words[1:])
     program = command.split()[0]
-    if shutil.which(program, path=_path()) is None:
+    if shutil.which(program) is None:
         raise SkipTest(f"{program} is not installed")
     done = subprocess.run(
-        ["bash", "-c", command], env={**os.environ, "PATH": _path()}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        stdin=subprocess.DEVNULL, text=True, timeout=60, check=False,
+        ["bash", "-c", command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        text=True, timeout=60, check=False,
     )  # fmt: skip
     return done.returncode, done.stdout
 
@@ -91,10 +92,6 @@ def _detent(words: list[str]) -> tuple[int, str]:
         except SystemExit as end:
             status = end.code
     return int(status or 0), printed.getvalue()
-
-
-def _path() -> str:
-    return f"{BIN}{os.pathsep}{os.environ['PATH']}"
 
 
 def _alike(expected: str, printed: str) -> bool:
@@ -119,6 +116,7 @@ def _setup(namespace: dict[str, Any]) -> None:
     shutil.copytree(ROOT / "examples", folder / "examples")
     environment = pytest.MonkeyPatch()
     environment.setenv("COLUMNS", "80")
+    environment.setenv("PATH", str(BIN), prepend=os.pathsep)
     environment.setenv("XDG_STATE_HOME", str(folder / "state"))
     namespace.update(page_folder=folder, page_environment=environment)
 

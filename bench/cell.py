@@ -18,9 +18,7 @@ def drilling() -> Cell:
     """The cell with its stop switch left alone: bar after bar."""
     description = parse((PLACE / "cell.toml").read_text(), "cell.toml")
     script = [entry for entry in description.script if "stop" not in entry.set]
-    return build(
-        description.model_copy(update={"script": script}), lambda file: (PLACE / file).read_text()
-    )
+    return build(description.model_copy(update={"script": script}), lambda file: (PLACE / file).read_text())
 
 
 def produce(seconds: int) -> Cell:

@@ -19,9 +19,7 @@ def plan(steps: int) -> None:
 def command(steps: int) -> None:
     """The move as a user runs it."""
     send = ["--send", "T1000", "--send", f"+{steps}"]
-    subprocess.run(
-        [sys.executable, "-m", "detent", "run", "gs-c200", "--json", *send], check=True, capture_output=True
-    )
+    subprocess.run([sys.executable, "-m", "detent", "run", "gs-c200", "--json", *send], check=True, capture_output=True)
 
 
 def rows() -> list[Row]:

@@ -124,6 +124,14 @@ class Axis:
             self._out.append(MotionStarted(now, train, given + 1, self.direction, self.shaft, self.name))
             self._plan(given + 1)
 
+    def remark(self, marks: Marks, now: Ns) -> None:
+        """Be woken at other pulses of the motion under way. Marks that have been passed are dropped."""
+        assert self.train is not None
+        given = self.given(now)
+        self._marks = tuple(mark for mark in _with_last(marks, self.train) if mark > given)
+        if not self._held:
+            self._plan(given + 1)
+
     def cut(self, now: Ns) -> None:
         """Stop the pulses at once."""
         given = self.given(now)

@@ -5,6 +5,7 @@ character of a burst ends at the burst's start plus k characters, rounded once.
 """
 
 from collections import deque
+from fractions import Fraction
 from typing import NamedTuple, Protocol
 
 from detent.ticks import NEVER, SECOND, Ns, round_ratio
@@ -50,10 +51,16 @@ class Sent(NamedTuple):
 
 
 class SerialPort(NamedTuple):
-    """A serial port of a device, by the pins that carry its characters."""
+    """A serial port of a device, by the pins that carry its characters.
+
+    `early` is how many bit times before the end of its stop bit the device recognises a character: then it is
+    received. With `start_bits` it sees, as a level 0 on the receiving pin, every start bit too.
+    """
 
     receives: str
     sends: str
+    early: Fraction = Fraction(0)
+    start_bits: bool = False
 
 
 class Outbox(Protocol):
@@ -88,9 +95,10 @@ class Transmitter:
                 self._out.append(Sent(now, self._port, Char(value), now))
             self.busy_until = now
             return
-        if self.busy_until <= now and not self._queue:
-            self._burst, self._index = now, 0
-            self.deadline = now
+        if not self._queue:
+            if self.busy_until <= now:
+                self._burst, self._index = now, 0
+            self.deadline = max(now, self.busy_until)
         self._queue.extend(data)
         self.busy_until = self._burst + self._format.duration(self._index + len(self._queue))
         self.advance(now)
@@ -100,6 +108,12 @@ class Transmitter:
         self._queue.clear()
         self.deadline = NEVER
         self.busy_until = self._burst + self._format.duration(self._index)
+
+    def change(self, form: Format) -> None:
+        """Send in another format from now on. No character may be waiting: `discard` them first."""
+        if self._queue:
+            raise RuntimeError("characters are waiting to be sent: discard them before the format changes")
+        self._burst, self._index, self._format = self.busy_until, 0, form
 
     def advance(self, now: Ns) -> None:
         """Begin the characters that are due up to and including `now`."""

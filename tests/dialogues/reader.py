@@ -25,7 +25,8 @@ What happens:
     pin UI1 = 0                  a level from outside;  switch NAME = 1  for a switch of the cell
     power off                    and on;  power off two  in a cell of several
     eeprom fails                 writing it;  eeprom works
-    wait 1.5 s                   let time pass;  wait idle  until RDY is 1;  wait pulse 12  of the present or next motion
+    wait 1.5 s                   let time pass;  wait idle  until RDY is 1
+    wait pulse 12                of the present motion, or of the next if nothing moves
     mark                         from here on times with a + are counted
 
 What must be true:
@@ -40,7 +41,7 @@ Answers that nobody expects fail, at the next command, wait or at the end.
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
@@ -50,12 +51,14 @@ from detent.axis import MotionStarted
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import parse
+from detent.cell.recording import Entry, Recording
 from detent.controllers import catalogue
 from detent.controllers.device import Powered
 from detent.pins import PinSet
 from detent.ticks import SECOND, parse_duration
 
 LONG_ENOUGH = 10_000 * SECOND  # nothing in a dialogue takes longer
+MOST_STEPS = 20_000  # nor more eventful instants in one wait
 SELECT = {7: "000", 6: "100", 5: "010", 4: "110", 3: "001", 2: "101", 1: "011"}  # SEL2 SEL1 SEL0, as printed
 
 
@@ -96,6 +99,25 @@ def files(folder: str) -> list[Path]:
     return sorted((Path(__file__).parent / folder).glob("*.txt"))
 
 
+class Watched(Recording):
+    """A recording that knows the present levels of all outputs."""
+
+    def __init__(self, so_far: Recording) -> None:
+        super().__init__(so_far.units)
+        self.levels: dict[tuple[str, str], int] = {}
+        for unit, entry in so_far:
+            self.extend(unit, (entry,))
+
+    def extend(self, unit: int, entries: Sequence[Entry]) -> None:
+        super().extend(unit, entries)
+        name = self.units[unit]
+        for entry in entries:
+            if isinstance(entry, PinSet):
+                self.levels[name, entry.pin] = entry.level
+            elif isinstance(entry, Powered) and not entry.on:
+                self.levels = {place: level for place, level in self.levels.items() if place[0] != name}
+
+
 class Player:
     """Plays one scene."""
 
@@ -112,6 +134,8 @@ class Player:
             getattr(self, f"make_{word}")(rest)
         self.eeprom_works = True
         self.cell = self.make()
+        watched = Watched(self.cell.recording)
+        self.cell.recording = self.watched = watched
         self.marked = 0
         self.before: dict[str, int] = {}  # what each unit had done at the mark
         self.arrived: list[tuple[int, int]] = []  # characters that nobody has looked at: (instant, value)
@@ -308,16 +332,20 @@ class Player:
             unit, _ = self.target(rest.removeprefix("idle").strip() + "." if rest != "idle" else "")
             self.step_until(lambda: self.level(unit, "RDY") != 0, "it never gets ready")
         elif rest.startswith("pulse "):
-            self.step_until(lambda: self.level(self.target("")[0], "MOV") == 1, "nothing moves")
+            unit, _ = self.target("")
+            self.step_until(lambda: self.level(unit, "MOV") == 1, "nothing moves")
             self.cell.run_to(self.last_motion().train.time_of(int(rest.removeprefix("pulse "))))
         else:
             self.cell.run_to(self.cell.now + parse_duration(rest))
         self.listen()
 
     def step_until(self, reached: Callable[[], bool], complaint: str) -> None:
-        while not reached():
+        for _ in range(MOST_STEPS):
+            if reached():
+                return
             at = self.cell.step()
             self.check(at is not None and at < LONG_ENOUGH, complaint)
+        self.check(False, complaint)
 
     def last_motion(self, unit: str = "") -> MotionStarted:
         entries = self.cell.recording.of(unit or self.target("")[0])
@@ -328,13 +356,7 @@ class Player:
     # -- what must be true -------------------------------------------------------------------------------
 
     def level(self, unit: str, pin: str) -> int | None:
-        level = None
-        for entry in self.cell.recording.of(unit):
-            if isinstance(entry, PinSet) and entry.pin == pin:
-                level = entry.level
-            elif isinstance(entry, Powered) and not entry.on:
-                level = None
-        return level
+        return self.watched.levels.get((unit, pin))
 
     def do_expect(self, rest: str) -> None:
         words = rest.split()

@@ -16,7 +16,11 @@ from detent.controllers import catalogue
 from detent.controllers.catalogue import CatalogueError, Model
 from detent.controllers.device import Controller, Device
 from detent.lines.line import Line
+from detent.lines.microbus import Microbus
 from detent.pins import HIGH, Level, Net, Pin, PinKind
+from detent.ticks import SECOND, round_ratio
+
+LINES: Mapping[str, type[Line]] = {"serial": Line, "microbus": Microbus}
 
 Read = Callable[[str], str]
 """The text of a file that the cell names (relative to the cell's own place). Raises OSError."""
@@ -156,7 +160,28 @@ class _Builder:
             if form != first:
                 what = f"{units[0]} is strapped for {first}, {unit} for {form}: units on one line need the same"
                 raise self.problem(f"units.{unit}.straps", what)
-        return Line(first, timed=timed)
+        port = self.controller(units[0]).serial_port
+        early = round_ratio(SECOND * port.early.numerator, first.baud * port.early.denominator)
+        kind = LINES[self.line_kind(units)]
+        return kind(first, timed=timed, early=early, start_bits=port.start_bits)
+
+    def line_kind(self, units: list[str]) -> str:
+        """The kind of line that all these units sit on, each told apart from the others."""
+        models = {unit: found for unit in units if isinstance(found := self.models[unit], Model)}
+        first = models[units[0]]
+        owners: dict[object, str] = {}
+        for unit, found in models.items():
+            if found.line != first.line:
+                what = f"a {first.name} and a {found.name} do not share a line: give {unit} one of its own"
+                raise self.problem(f"units.{unit}.model", what)
+            option = found.told_apart_by
+            if option:
+                value = getattr(self.controller(unit), option)
+                other = owners.setdefault(value, unit)
+                if other != unit:
+                    what = f"{other} and {unit} both have the {option} {value}: change one of them"
+                    raise self.problem(f"units.{unit}.options", what)
+        return first.line
 
     # -- switches and wires ------------------------------------------------------------------------------
 
@@ -270,6 +295,11 @@ class _Builder:
             self.need_unit(f"{key}.to", entry.to)
             if entry.to not in {unit for units in self.line_units().values() for unit in units}:
                 raise self.problem(f"{key}.to", f"{entry.to} is on no line: put it on one in [lines]")
+            for text in entry.send:
+                try:
+                    self.controller(entry.to).frame(text)
+                except ValueError as error:
+                    raise self.problem(f"{key}.send", str(error)) from None
             found += [Action(entry.at, Type(entry.to, text)) for text in entry.send]
         return found
 

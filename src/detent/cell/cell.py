@@ -16,7 +16,7 @@ from detent.cell.deeds import Action, Deed, Power, Send, SetPin, SetSwitch, Star
 from detent.cell.recording import InputSet, Log, Received, Recording
 from detent.controllers.device import Controller, Device, Output, Powered, StoreImage
 from detent.lines.line import EVERYBODY, Line
-from detent.pins import HIGH, Level, Net, PinSet
+from detent.pins import HIGH, LOW, Level, Net, PinSet
 from detent.ticks import NEVER, Ns
 from detent.uart import Sent
 
@@ -300,7 +300,14 @@ class Cell:
         for line, units in zip(self.lines, self.wiring.lines, strict=True):
             if line.deadline > at:
                 continue
+            for level in line.strobes(at):
+                for unit, _ in units:
+                    self._set_pin(unit, line.strobe, level)
             arrived = line.advance(at)
+            if line.started():
+                for unit, port in units:
+                    self.parts[unit].set_pin(port, LOW, at)
+                    self._touched.add(unit)
             for place, (unit, port) in enumerate(units):
                 if heard := [arrival.sent for arrival in arrived if arrival.place in (place, EVERYBODY)]:
                     if self.recording is not None:

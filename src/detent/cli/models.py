@@ -52,16 +52,15 @@ Rows = list[dict[str, Any]]
 def _tables(model: "Model") -> dict[str, Rows]:
     """The model's tables: rows of named columns, everything as it is printed."""
     levels = {0: "low", 1: "open"}
-    return {
+    tables: dict[str, Rows] = {
         "pins": [
             {"pin": pin.name, "number": pin.number, "kind": pin.kind.value, "what": pin.help} for pin in model.pins
         ],
         "straps": [{"strap": name, "default": levels[level]} for name, level in model.straps.items()],
-        "options": [
-            {"option": o.name, "takes": o.takes, "default": o.default, "what": o.help} for o in model.options
-        ],
+        "options": [{"option": o.name, "takes": o.takes, "default": o.default, "what": o.help} for o in model.options],
         "commands": [row._asdict() for row in model.commands()],
     }
+    return {title: rows for title, rows in tables.items() if rows}
 
 
 def reference(model: "Model") -> str:

@@ -114,27 +114,31 @@ def _addressed(cell: "Cell", text: str) -> tuple[str, str]:
     from detent.controllers.catalogue import unknown
 
     units = list(cell.controllers())
-    if len(units) == 1:
-        return units[0], text
-    unit, colon, line = text.partition(":")
+    unit, colon, line = (units[0], ":", text) if len(units) == 1 else text.partition(":")
     if not colon:
         raise Problem("", "--send", f"{text!r}: a cell has several units, write UNIT:LINE")
     if unit not in units:
         raise Problem("", "--send", str(unknown("unit", unit, units)))
     if cell.wiring.line_of[cell.unit(unit)] < 0:
         raise Problem("", "--send", f"{unit} is on no line")
+    try:
+        cell.controller(unit).frame(line)
+    except ValueError as error:
+        raise Problem("", "--send", str(error)) from None
     return unit, line
 
 
 def _exchange(cell: "Cell", unit: str, text: str) -> Exchange:
     """Send a line and let the cell go on until it is answered and the line is quiet, or nothing is left to do."""
+    from detent.controllers.catalogue import model
     from detent.ticks import NEVER
 
     line = cell.lines[cell.wiring.line_of[cell.unit(unit)]]
     line.take()
     cell.type(unit, text)
+    answered = model(cell.controller(unit).model).answered(text)
     for _ in range(MOST_INSTANTS):
-        if line.heard and line.deadline >= NEVER:
+        if (line.heard or not answered) and line.deadline >= NEVER:
             break
         if cell.step() is None:
             break

@@ -1,5 +1,6 @@
 """The verb `serve`: a controller or a cell in real time, on terminals, ports and wires."""
 
+import gc
 import json as json_text
 import math
 import sys
@@ -86,13 +87,15 @@ def serve(
             asked_wrongly(error)
         except ValueError as error:
             asked_wrongly(Problem("", "", str(error)))
-        with service:
+        # before anybody is told that it is ready: who hears that may end it at once
+        with service, service.stopped_by_signals():
             for report in service.reports:
                 print(f"detent: {report}", file=sys.stderr)
             if json:
                 print(json_text.dumps(_facts(service.endpoints)), flush=True)
             else:
                 _print_ready(service, found.description, folder, pace)
+            gc.freeze()  # what is there now stays: no collection shall look at it while a deadline waits
             try:
                 service.run()
             except (EndpointLost, Oscillation) as error:

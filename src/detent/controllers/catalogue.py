@@ -13,7 +13,14 @@ from detent.controllers.gsc200 import commands as gsc200_commands
 from detent.controllers.gsc200 import pins as gsc200_pins
 from detent.controllers.gsc200 import program as gsc200_program
 from detent.controllers.gsc200.firmware import GsC200
+from detent.controllers.supersigma import commands as supersigma_commands
+from detent.controllers.supersigma import link as supersigma_link
+from detent.controllers.supersigma import pins as supersigma_pins
+from detent.controllers.supersigma.firmware import Supersigma
+from detent.controllers.supersigma.program import LEAST_OFFSET
 from detent.pins import Level, Pin, PinKind
+from detent.ramps import differences
+from detent.ramps.short_movements import Way
 from detent.ticks import US, parse_duration
 
 
@@ -45,6 +52,9 @@ class Model(NamedTuple):
     language: Callable[[], Language[Any]] | None  # None: it holds no programs
     commands: Callable[[], Sequence[CommandHelp]]
     strap_line: Callable[[Sequence[tuple[str, Mapping[str, Level]]]], list[dict[str, Level]]]
+    line: str = "serial"  # the kind of line it sits on
+    told_apart_by: str = ""  # the option, an attribute of the controller too, in which units of one line must differ
+    answered: Callable[[str], bool] = lambda text: True  # whether a host gets an answer to a command line
 
 
 def unknown(kind: str, name: str, known: Sequence[str]) -> CatalogueError:
@@ -161,6 +171,39 @@ _GSC200_REVISION = Option(
 )  # fmt: skip
 
 
+def _whole(low: int, high: int) -> Callable[[str], int]:
+    """Reads a whole number from `low` to `high`."""
+
+    def read(text: str) -> int:
+        value = int(text)
+        if not low <= value <= high:
+            raise ValueError(text)
+        return value
+
+    return read
+
+
+_SUPERSIGMA_OPTIONS = (
+    Option("number", "number", _whole(0, 255), "a number, 0 to 255", "1", "number of the drive on its MICROBUS"),
+    Option(
+        "short", "short", _choice(**{way.value: way for way in Way}), "hyperbola, exact or free", "hyperbola",
+        "ramps of short movements: by the paper's hyperbola, the best of its family, or a curve cut to the length",
+    ),
+    Option(
+        "offset", "offset", _whole(LEAST_OFFSET, 1000), f"half steps, {LEAST_OFFSET} to 1000", "10",
+        "half steps that a movement keeps in reserve for low speed behind its ramp",
+    ),
+    Option(
+        "braking", "braking", _whole(1, 100), "a whole number, 1 to 100", "4",
+        "in an emergency the loads of the ramp come so many times as often",
+    ),
+    Option(
+        "table", "table", differences.parse, "the line that detent table --option prints", "the paper's",
+        "the table of differences in its EPROM",
+    ),
+)  # fmt: skip
+
+
 def _gsc200(name: str, options: tuple[Option, ...]) -> Model:
     return Model(
         name,
@@ -179,4 +222,19 @@ def _gsc200(name: str, options: tuple[Option, ...]) -> Model:
 MODELS: dict[str, Model] = {
     "gs-c200": _gsc200("gs-c200", (*_GSC200_OPTIONS, _GSC200_REVISION)),
     "gs-c200s": _gsc200("gs-c200s", _GSC200_OPTIONS),
+    "supersigma": Model(
+        "supersigma",
+        "SUPERSIGMA microcomputer stepping motor drive (8748 and 8253)",
+        "docs/controllers/supersigma.md",
+        supersigma_pins.PINS,
+        supersigma_pins.DEFAULT_STRAPS,
+        _SUPERSIGMA_OPTIONS,
+        Supersigma,
+        None,
+        supersigma_commands.reference,
+        supersigma_pins.strap_line,
+        line="microbus",
+        told_apart_by="number",
+        answered=supersigma_link.answered,
+    ),
 }

@@ -141,7 +141,10 @@ class Controller(Device, Protocol):
         """Where an axis is and what the controller does, at `now`; the first axis unless it is named."""
 
     def frame(self, text: str) -> bytes:
-        """The bytes a host sends for the command line `text`: address, checksum and terminator added."""
+        """The bytes a host sends for the command line `text`: address, checksum and terminator added.
+
+        Raises ValueError with a remedy where a line cannot be put into bytes.
+        """
 
     def answers(self, data: bytes) -> list[str]:
         """What a host reads in the bytes that came from it: the answers, without what the link adds."""
@@ -157,4 +160,3 @@ class Controller(Device, Protocol):
 
     def start(self, now: Ns) -> None:
         """Start the program in memory, as if a host had asked for it."""
-

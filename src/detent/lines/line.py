@@ -1,12 +1,13 @@
 """A line from a host to its units: every unit hears the host, the host hears every unit.
 
 With one unit that is a point-to-point connection, with several a multipoint one. Characters are delivered at
-the end of their last stop bit. The units' outputs share a wire on which a 0 wins: characters of two units that
+the end of their last stop bit, or earlier where a receiver does not wait for it. The units' outputs share a wire on which a 0 wins: characters of two units that
 coincide in time merge bit by bit, and ones that only overlap are damaged.
 """
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
+from detent.pins import Level
 from detent.ticks import NEVER, Ns
 from detent.uart import Char, Format, Sent, Transmitter
 
@@ -37,12 +38,19 @@ class _Talking(NamedTuple):
 
 
 class Line:
-    """One host, some units, one character format. With `timed` false, characters take no time."""
+    """One host, some units, one character format. With `timed` false, characters take no time.
 
-    __slots__ = ("_from_units", "_host", "_on_wire", "deadline", "format", "heard")
+    The units receive a character `early` ns before its end; with `start_bits`, `started` tells when one begins.
+    """
 
-    def __init__(self, form: Format, *, timed: bool = True) -> None:
+    __slots__ = ("_early", "_from_units", "_host", "_on_wire", "_start_bits", "_told", "deadline", "format", "heard")
+
+    strobe: ClassVar[str] = ""  # the input of every unit that the line drives, if it has such a wire
+
+    def __init__(self, form: Format, *, timed: bool = True, early: Ns = 0, start_bits: bool = False) -> None:
         self.format = form
+        self._early, self._start_bits = (early, start_bits) if timed else (0, False)
+        self._told = 0  # characters on the wire whose start bits were told
         self.deadline: Ns = NEVER
         self.heard: list[Heard] = []  # what reached the host and was not taken yet
         self._on_wire: list[Sent] = []  # from the host; also the transmitter's outbox
@@ -80,16 +88,29 @@ class Line:
         if due:
             self._from_units = [talking for talking in self._from_units if talking.done > now]
             self.heard += [Heard(talking.done, talking.char) for talking in due]
-        arrived = [sent for sent in self._on_wire if sent.done <= now]
+        arrived = [sent for sent in self._on_wire if sent.done - self._early <= now]
         if arrived:
             del self._on_wire[: len(arrived)]
+            self._told = max(self._told - len(arrived), 0)
         self._plan()
         return [Arrival(EVERYBODY, self._narrowed(sent)) for sent in arrived]
+
+    def strobes(self, now: Ns) -> list[Level]:
+        """The levels that the strobe takes up to and including `now`, in order; to be asked before `advance`."""
+        return []
 
     def _narrowed(self, sent: Sent) -> Sent:
         """The character as it arrives: one too wide for the line has its parity spoilt."""
         value, width = sent.char.value, 1 << self.format.data_bits
         return sent if value < width else sent._replace(char=Char(value % width, parity_ok=False))
+
+    def started(self) -> bool:
+        """Whether the host has begun a character since the last call. Never, unless units want to know."""
+        if not self._start_bits or self._told == len(self._on_wire):
+            return False
+        self._told = len(self._on_wire)
+        self._plan()
+        return True
 
     def take(self) -> list[Heard]:
         """What has reached the host since the last call."""
@@ -99,8 +120,10 @@ class Line:
 
     def _plan(self) -> None:
         deadline = self._host.deadline
-        if self._on_wire and self._on_wire[0].done < deadline:
-            deadline = self._on_wire[0].done
+        if self._on_wire and self._on_wire[0].done - self._early < deadline:
+            deadline = self._on_wire[0].done - self._early
+        if self._start_bits and self._told < len(self._on_wire):
+            deadline = min(deadline, self._on_wire[self._told].at)
         for talking in self._from_units:
             if talking.done < deadline:
                 deadline = talking.done

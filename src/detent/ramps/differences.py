@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import Any
 
 from detent.ramps.rate_generator import CLOCK_HZ, CLOCK_NS
@@ -100,13 +100,13 @@ def compiled(curve: Curve, duration: float, interval: int = INTERVAL) -> Differe
         raise CurveError(f"the curve lasts {duration:g} s and the interval is {times_of(interval)}: "
                          "there is no difference; make the curve longer or the interval shorter")  # fmt: skip
     counts = [_count(curve(t), t) for t in times]
-    for i, (before, after) in enumerate(zip(counts, counts[1:], strict=False)):
+    for i, (before, after) in enumerate(pairwise(counts)):
         if not 0 <= before - after <= LARGEST_DIFFERENCE:
             raise CurveError(_misfit(curve, times, counts, i))
     if len(counts) - 1 > ROOM:
         raise CurveError(f"{len(counts) - 1} differences, and beside the program the 8748 has room for {ROOM} bytes: "
                          "make the curve shorter or the interval longer")  # fmt: skip
-    differences = bytes(a - b for a, b in zip(counts, counts[1:], strict=False))
+    differences = bytes(a - b for a, b in pairwise(counts))
     return Differences(counts[0], differences, interval)
 
 
@@ -135,42 +135,6 @@ def _misfit(curve: Curve, times: Sequence[float], counts: Sequence[int], i: int)
     return f"{place} is {difference} and does not fit a byte: make the curve less steep there or the interval shorter"
 
 
-# -- curves ----------------------------------------------------------------------------------------------
-
-PEAK, ANGULAR, PHASE, DURATION = 15_000.0, 4.54426, 0.2097, 0.3
-
-
-def sine_squared(peak: float = PEAK, angular: float = ANGULAR, phase: float = PHASE) -> Curve:
-    """V = peak sin^2(angular t + phase), the paper's law (equation 3).
-
-    The paper prints a peak of 14 000, which gives neither of its own end points; 15 000 gives both: 650 at 0 s and
-    15 000 at 0.3 s.
-    """
-    return lambda t: peak * math.sin(angular * t + phase) ** 2
-
-
-def linear(low: float, high: float, duration: float) -> Curve:
-    """From `low` to `high` at constant acceleration."""
-    return lambda t: low + (high - low) * t / duration
-
-
-def through(points: Sequence[tuple[float, float]]) -> Curve:
-    """Straight lines through the points (t, V), which rise in t; V is constant outside. Raises CurveError."""
-    if len(points) < 2:
-        raise CurveError("a curve needs two points t,V at least")
-    for (t, _), (later, _) in zip(points, points[1:], strict=False):
-        if not later > t:
-            raise CurveError(f"the points must rise in t: {later:g} s comes behind {t:g} s")
-
-    def curve(t: float) -> float:
-        for (t0, v0), (t1, v1) in zip(points, points[1:], strict=False):
-            if t <= t1:
-                return v0 + (v1 - v0) * max(t - t0, 0.0) / (t1 - t0)
-        return points[-1][1]
-
-    return curve
-
-
 PAPER = Differences(3076, bytes.fromhex(
     "a3968a80776e676059544e4a45413d393634302e2c2927252422201e1d1c1b19"
     "1917161614141312111110100f0e0e0d0d0d0c0b0c0b0a0a0a090a0908090808"
@@ -181,4 +145,4 @@ PAPER = Differences(3076, bytes.fromhex(
     "0001000001000001000001000000010000000100000000000100000000000000"
     "0000010000000000"
 ))  # fmt: skip
-"""The table of the paper: 15 000 sin^2(4.544 26 t + 0.2097), kept as bytes so that no mathematical library has a say."""
+"""The paper's table, of 15 000 sin^2(4.544 26 t + 0.2097): kept as bytes, so that no mathematical library has a say."""

@@ -14,12 +14,13 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from detent.pulses.segment import Int64Array
 from detent.ramps.differences import LARGEST_N, PAPER, Differences
 from detent.ramps.table_movement import Movement, constant, ramped
 
-NEVER = np.iinfo(np.int64).max
+NEVER = int(np.iinfo(np.int64).max)  # a movement that is not to be had
 
 
 class Way(Enum):
@@ -61,12 +62,16 @@ class Profiles(NamedTuple):
         return self
 
     def clocks(self, steps: int, offset: int) -> Int64Array:
-        """The clock of the last pulse of a movement of `steps` with each; `NEVER` where two ramps do not fit."""
-        spare = steps - 2 * self.up - offset  # pulses at top speed, nd - na
-        far = self.up_clocks + (spare - 1) * self.top + self.down_clocks + (self.up + offset - self.down) * self.low
-        near = self.close_clocks + (self.up + offset - self.close) * self.low
+        """The clock of the last pulse of a movement of `steps` with each; `NEVER` where two ramps do not fit.
+
+        They fit if steps >= 2 na + offset, and if the table ends no later than the pulses.
+        """
+        spare = steps - 2 * self.up - offset  # nd - na
+        left = self.up + offset  # behind nd
+        far = self.up_clocks + (spare - 1) * self.top + self.down_clocks + (left - self.down) * self.low
+        near = self.close_clocks + (left - self.close) * self.low
         result: Int64Array = np.where(spare > 0, far, near)
-        result[spare < 0] = NEVER
+        result[(spare < 0) | (np.where(spare > 0, self.down, self.close) > left)] = NEVER
         result[self.entries == 0] = steps * int(self.low[0])
         return result
 
@@ -75,35 +80,39 @@ def profiles(table: Differences, ramps: Sequence[Ramp]) -> Profiles:
     """What `ramps` of a table come to; all of them have one first N, or one number of differences."""
     first, entries = (np.array(column, np.int64) for column in zip(*ramps, strict=True))
     taken = np.array(table.counts(0), np.int64)
-    up, up_clocks, loaded = np.zeros_like(first), np.zeros_like(first), first.copy()
+    near = _Generators(first)
     for entry in range(1, int(entries.max()) + 1):
-        _load(up, up_clocks, loaded, np.full_like(first, entry * table.interval), first + taken[entry], entries >= entry)
-    end = entries * table.interval
-    far = [np.zeros_like(first), np.zeros_like(first), loaded.copy()]
-    near = [up.copy(), up_clocks.copy(), loaded.copy()]
+        near.load(entry * table.interval, first + taken[entry], entries >= entry)
+    top, end = near.loaded.copy(), entries * table.interval
+    up, up_clocks = near.pulses - (entries > 0), near.at.copy()
+    far = _Generators(top)
     for i in range(int(entries.max())):
-        valid = entries > i
         n = first + taken[np.maximum(entries - 1 - i, 0)]
-        _load(*far, np.full_like(first, i * table.interval), n, valid)
-        _load(*near, end + i * table.interval, n, valid)
-    up -= entries > 0
-    return Profiles(first, entries, up, up_clocks, far[0], far[1], near[0] - up, near[1], loaded + 1, first + 1)
+        far.load(i * table.interval, n, entries > i)
+        near.load(end + i * table.interval, n, entries > i)
+    return Profiles(first, entries, up, up_clocks, far.pulses, far.at, near.pulses - up, near.at, top + 1, first + 1)
 
 
-def _load(
-    pulses: Int64Array, at: Int64Array, loaded: Int64Array, clock: Int64Array, n: Int64Array, valid: "np.ndarray[Any, Any]"
-) -> None:
-    """`RateGenerator.load` for each ramp that is `valid`, in place."""
-    runs = np.where(valid & (at <= clock), (clock - at) // (loaded + 1) + 1, 0)
-    pulses += runs
-    at += runs * (loaded + 1)
-    np.copyto(loaded, n, where=valid)
+class _Generators:
+    """Rate generators side by side (see `RateGenerator`)."""
+
+    def __init__(self, n: Int64Array) -> None:
+        self.loaded, self.at, self.pulses = n.copy(), np.zeros_like(n), np.zeros_like(n)
+
+    def load(self, clock: Int64Array | int, n: Int64Array, chosen: npt.NDArray[np.bool_]) -> None:
+        """At `clock` load `n` into the chosen ones."""
+        period = self.loaded + 1
+        runs = np.where(chosen & (self.at <= clock), (clock - self.at) // period + 1, 0)
+        self.pulses += runs
+        self.at += runs * period
+        np.copyto(self.loaded, n, where=chosen)
 
 
 @lru_cache(maxsize=32)
 def family(table: Differences, entries: int) -> Profiles:
-    """The members of the family of figure 10 with `entries` differences, from the table's own first N to the slowest
-    that can be of use: constant low speed does in the time of its two ramps what they do, and more.
+    """The members of the family of figure 10 with `entries` differences, by first N.
+
+    From the table's own to the slowest that can be of use: one whose steps constant low speed does in less time.
     """
     idle = 2 * entries * table.interval // (table.first + 1)  # pulses at low speed in the time of two ramps
     last, step = table.first, 256
@@ -116,15 +125,6 @@ def family(table: Differences, entries: int) -> Profiles:
 def cuts(table: Differences, entries: int) -> Profiles:
     """The table cut to its first 0, 1, ... up to `entries` differences."""
     return profiles(table, [Ramp(table.first, count) for count in range(entries + 1)])
-
-
-@lru_cache(maxsize=32)
-def least_offset(table: Differences) -> int:
-    """The least offset with which the table ends no later than the pulses, whatever the length and the way."""
-    found = 0
-    for some in (family(table, len(table.differences)), cuts(table, len(table.differences))):
-        found = max(found, int((some.down - some.up).max()), int((some.close - some.up).max()))
-    return found
 
 
 class Hyperbola(NamedTuple):
@@ -157,7 +157,8 @@ def hyperbola(table: Differences) -> Hyperbola:
     # for ramps of m steps the first N must be one whose na is m at most: from each na on the least such N
     most = int(members.up[0])
     shift = 10
-    needed = [(m, int(members.first[np.argmax(members.up <= m)])) for m in range(max(int(members.up[-1]), shift + 1), most + 1)]
+    least = max(int(members.up[-1]), shift + 1)
+    needed = [(m, int(members.first[np.argmax(members.up <= m)])) for m in range(least, most + 1)]
     best: tuple[int, Hyperbola] | None = None
     for i in range(64):
         base = table.first * i // 64
@@ -170,22 +171,34 @@ def hyperbola(table: Differences) -> Hyperbola:
     return best[1]
 
 
+@lru_cache(maxsize=32)
+def shortest(table: Differences, offset: int) -> int:
+    """The least steps for which a member of the family beats constant low speed: below, the movement is very short."""
+    members = family(table, len(table.differences))
+    steps = 1
+    while int(members.clocks(steps, offset).min()) >= steps * (table.first + 1):
+        steps += 1
+    return steps
+
+
 def choose(table: Differences, steps: int, offset: int, way: Way, entries: int) -> Ramp:
     """The ramps of a movement of `steps` with no more than `entries` differences, by `way`.
 
     A movement that has room for both of its ramps from the table's own first N gets them. A shorter one gets what
-    `way` says, and constant low speed where that is no slower. With fewer entries than the table has (a speed
+    `way` says, or constant low speed where that is no slower. With fewer entries than the table has (a speed
     limit) there is no hyperbola, and the exact way takes its place.
     """
     whole = Ramp(table.first, entries)
-    if entries == 0 or ramp_steps(table, whole) * 2 + offset <= steps:
+    if entries == 0 or int(_profile(table, whole).clocks(steps, offset)[0]) < NEVER:
         return whole
     if way is Way.HYPERBOLA and entries == len(table.differences):
-        found = Ramp(hyperbola(table).first((steps - offset) // 2), entries)
-        if 2 * ramp_steps(table, found) + offset > steps:
+        if steps < shortest(table, offset):
             return Ramp(table.first, 0)
-        takes = ramped(table, found.first, entries, steps, offset).clocks
-        return found if takes < steps * (table.first + 1) else Ramp(table.first, 0)
+        members = family(table, entries)
+        first = hyperbola(table).first((steps - offset) // 2)
+        fits = members.clocks(steps, offset) < NEVER
+        # the very one, but for an offset so small that its table would end too late
+        return Ramp(first + int(fits[first - table.first :].argmax()), entries)
     some = cuts(table, entries) if way is Way.FREE else family(table, entries)
     clocks = some.clocks(steps, offset)
     at = int(clocks.argmin())
@@ -195,12 +208,10 @@ def choose(table: Differences, steps: int, offset: int, way: Way, entries: int) 
 
 
 @lru_cache(maxsize=1024)
-def ramp_steps(table: Differences, ramp: Ramp) -> int:
-    """The steps of a ramp, na."""
-    return int(profiles(table, [ramp]).up[0])
+def _profile(table: Differences, ramp: Ramp) -> Profiles:
+    return profiles(table, [ramp])
 
 
-@lru_cache(maxsize=1024)
 def movement(table: Differences, steps: int, offset: int, way: Way, entries: int) -> Movement:
     """The movement of `steps` that `choose` comes to."""
     ramp = choose(table, steps, offset, way, entries)

@@ -100,7 +100,8 @@ class _Phases:
 
     def finish(self, speed: int) -> None:
         """Go on at `speed` up to the goal."""
-        assert self.left is not None
+        if self.left is None or self.done:
+            return
         self.add(-((self.phase - self.left * UNIT) // speed), speed)
 
     def ramp(self, speed: int, slope: int) -> None:
@@ -130,33 +131,30 @@ def toward(
     speed then is. A speed that is not below `run` at the start stays as it is.
     """
     phases = _Phases(phase, speed, steps)
-    kept, wanted = keep * UPDATES, run * UPDATES
+    kept, wanted = keep * UPDATES, max(run * UPDATES, speed)
     rises = falls = 0
     if not braking:
         least = 2 * braking_slope
-        free = least * steps * UNIT + kept * kept  # braking begins when least * position + speed**2 reaches it
+        enough = least * steps * UNIT + kept * kept  # it brakes once least * position + speed**2 has reached this
 
         def brakes_after(tick: int) -> bool:
             """Whether the comparison after so many ticks of the up ramp finds the distance too short."""
             position = phase + tick * speed + slope * (tick * (tick + 1) // 2)
-            return least * position + (speed + slope * tick) ** 2 >= free
+            return least * position + (speed + slope * tick) ** 2 >= enough
 
-        up = max(wanted - speed, 0) // slope
-        rises = first_true(brakes_after, up + 1)
-        phases.add(rises, speed, slope)
-        if rises > up:  # never: the full speed is reached
-            rises = up
-            cruise = max(speed, wanted)
+        up = (wanted - speed) // slope
+        rises = falls = first_true(brakes_after, up + 1)
+        phases.add(min(rises, up), speed, slope)
+        if rises > up:  # the full speed is reached; a last, smaller gain belongs to the first tick at it
+            rises = up + (speed + slope * up < wanted)
             position = phase + up * speed + slope * (up * (up + 1) // 2)
-            falls = -((least * position + cruise * cruise - free) // (least * cruise))
-            phases.add(falls, cruise)
-            if cruise > phases.begin.speed + slope * up and falls > 0:
-                rises += 1  # the tick on which the speed is reached adds what is left
-        falls += min(rises, up)
+            steady = max(-((least * position + wanted * wanted - enough) // (least * wanted)), 1)
+            phases.add(steady, wanted)
+            falls = up + steady
     if phases.speed > kept:
         phases.ramp(kept, slope)
         phases.finish(kept)
-    elif not phases.done:
+    else:
         phases.finish(phases.speed)
     return phases.plan(rises, falls)
 
@@ -181,6 +179,7 @@ def slewing(phase: int, speed: int, run: int, slope: int, room: int) -> Plan:
     phases.ramp(wanted, slope)
     rises = phases.ticks
     if not phases.done:
+        rises += phases.speed < wanted
         phases.finish(wanted)
     return phases.plan(rises, phases.ticks)
 

@@ -4,6 +4,7 @@ The map is one fraction from one origin, in integers: nothing is added up, so a 
 its first millisecond. `WallNs` are nanoseconds of a monotonic clock.
 """
 
+import math
 import time
 from collections.abc import Callable
 from fractions import Fraction
@@ -22,10 +23,10 @@ class Pace:
     """Cell time runs `factor` times as fast as the clock, from `origin` at the moment this is made."""
 
     def __init__(self, factor: Fraction | float = 1, *, origin: Ns = 0, clock: Clock = time.monotonic_ns) -> None:
+        if not 0 < factor < math.inf:
+            raise ValueError(f"pace {factor} would not go forward; it takes a number above 0")
         # the decimal that was written, not its binary neighbour: 0.1 is one tenth
         exact = factor if isinstance(factor, Fraction) else Fraction(repr(factor))
-        if exact <= 0:
-            raise ValueError(f"pace {factor} would not go forward; it takes a number above 0")
         self.clock = clock
         self.factor = exact
         self.lateness = Lateness()

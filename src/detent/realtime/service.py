@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -73,11 +74,14 @@ class Service:
         self.pace.restart(self.cell.now)
 
     def run(self) -> None:
-        """Serve until `stop` or a signal to end. Raises EndpointLost, and what the cell raises."""
+        """Serve until `stop`, also one that was called already. Raises EndpointLost, and what the cell raises."""
         wake_exactly()
         self.restart_clock()  # the time since the cell was made was ours, not the cell's
-        with stopped_by_signals(self._loop):
-            self._loop.run()
+        self._loop.run()
+
+    def stopped_by_signals(self) -> AbstractContextManager[None]:
+        """SIGTERM, SIGINT and SIGHUP call `stop` while this lasts. For the main thread."""
+        return stopped_by_signals(self._loop)
 
     def step(self) -> None:
         """Wait until there is something to do, then do it."""

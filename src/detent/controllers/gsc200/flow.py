@@ -12,30 +12,33 @@ from detent.controllers.gsc200.program import Step
 class Flow:
     """The program counter, the stack of loop marks, and the input that guards the whole program."""
 
-    __slots__ = ("_marks", "address", "guard")
+    __slots__ = ("_marks", "address", "guard", "jumped")
 
     def __init__(self) -> None:
         self.address = 0
         self.guard = 0  # user input of a U as first instruction; 0: none
+        self.jumped = False  # `address` is where a j or jc leads: an instruction must start there
         self._marks: list[list[int]] = []  # [address that owns it, where the body begins, rounds begun]
 
     def restart(self) -> None:
         """Go to address 0 as a fresh program: no marks, no guard."""
         self.address = self.guard = 0
+        self.jumped = False
         self._marks.clear()
 
     def follow(self, step: Step, inputs: int) -> None:
         """Set `address` to where the program goes after `step`, with the user inputs weighted 1, 2, 4."""
         self.address = step.next
+        self.jumped = False
         instruction = step.instruction
         match instruction.op:
             case Op.LOOP:
                 self._loop(step, instruction)
             case Op.JUMP:
-                self.address = instruction.value
+                self.address, self.jumped = instruction.value, True
             case Op.JUMP_IF:
                 if inputs == instruction.other:
-                    self.address = instruction.value
+                    self.address, self.jumped = instruction.value, True
             case Op.UNTIL:
                 if step.address == 0:
                     self.guard = instruction.value

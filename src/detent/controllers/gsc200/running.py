@@ -169,10 +169,11 @@ class Running:
         assert program is not None
         step = program.at(flow.address)
         if step is not None:
+            flow.jumped = False
             self._out.append(Executing(now, step.address, step.text))
             self._DO[step.instruction.op](self, step, now)
-        elif flow.address != program.size:
-            self._end(now, error=4)  # a jump into the middle of an instruction, or behind the program
+        elif flow.jumped:
+            self._end(now, error=4)  # into the middle of an instruction, or behind the program
         elif flow.guard and self._inputs[USER_INPUTS[flow.guard]] == HIGH:
             flow.restart()
             self._fetch(now)
@@ -256,7 +257,7 @@ class Running:
             return False
         assert self._program is not None
         self.error = 5
-        self._flow.restart()
+        self._flow.restart()  # no guard starts it again
         self._flow.address = self._program.size
         self.timer = now + self._instruction_time
         return True

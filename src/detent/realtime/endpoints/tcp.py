@@ -60,9 +60,12 @@ class TcpPort:
         return self._outgoing.dropped
 
     def reading(self, room: bool) -> Sequence[int]:
-        """The port, for new clients; the client, while the line has room and it has not said everything."""
+        """The client, while the line has room and it has not said everything; the port, for new clients.
+
+        In this order, so that a client that leaves makes room for one that comes in the same wake-up.
+        """
         if room and self._client is not None and self._until is None:
-            return (self._listener.fileno(), self._client.fileno())
+            return (self._client.fileno(), self._listener.fileno())
         return (self._listener.fileno(),)
 
     def writing(self) -> Sequence[int]:
@@ -127,7 +130,7 @@ class TcpPort:
         except OSError:
             return  # it went away before it was let in, or there is no descriptor left for it
         peer = str(TcpAddress(address[0], address[1]))
-        if self._client is not None and self._until is None:
+        if self._client is not None and self._until is None and not _gone(self._client):
             _refuse(client, f"{self._name} is in use by {self._peer}; one client at a time, try again later")
             return
         self._leave()
@@ -171,6 +174,16 @@ def _listen(address: TcpAddress) -> socket.socket:
             f"{address} cannot be listened on: {error.strerror}; choose another port, or 0 for any free one"
         ) from error
     return listener
+
+
+def _gone(client: socket.socket) -> bool:
+    """Whether a client that is not being read just now, because its line is behind, has said everything and left."""
+    try:
+        return client.recv(1, socket.MSG_PEEK) == b""
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
 
 
 def _refuse(client: socket.socket, text: str) -> None:

@@ -1,0 +1,366 @@
+"""Moves, constant velocity, home, jog, step inputs, limits and trip positions of one axis.
+
+A motion is planned as a train; whatever happens in the middle turns it into another that agrees with the pulses
+already sent. `advance` tells when a motion has ended and when a step has reached the trip position.
+"""
+
+from enum import Enum
+from typing import NamedTuple
+
+from detent.axis import Axis
+from detent.controllers.dcb274 import settings
+from detent.controllers.dcb274.pins import DIRECTION_HOLD, LEAST_STEP_LOW, LEAST_STEP_PERIOD
+from detent.controllers.dcb274.ports import Ports
+from detent.controllers.dcb274.settings import Settings
+from detent.pins import HIGH, LOW, Level
+from detent.pulses import Train, Uniform
+from detent.ramps import timer_table
+from detent.ticks import MS, NEVER, SECOND, Ns, to_fixed
+
+SETTLING: Ns = SECOND  # from the end of a motion to the hold current (page 52)
+COUNTS = 1 << 24  # of the position counter
+JOG_UNIT = 30  # full steps/s
+
+
+class Course(Enum):
+    """What the axis is doing."""
+
+    REST = "rest"
+    INDEX = "index"
+    SEEK_LOW = "seek home low"
+    SEEK_HIGH = "seek home high"
+    VELOCITY = "velocity"
+    JOG = "jog"
+
+
+_INDEXING = (Course.INDEX, Course.SEEK_LOW, Course.SEEK_HIGH)
+
+
+class News(NamedTuple):
+    """What a deadline brought: the motion has ended; a step has reached the trip position."""
+
+    ended: bool = False
+    tripped: bool = False
+
+
+NOTHING = News()
+ENDED = News(ended=True)
+
+
+def wrapped(position: int) -> int:
+    """A position as the 24-bit counter has it."""
+    return (position + COUNTS // 2) % COUNTS - COUNTS // 2
+
+
+class Motion:
+    """The motion of one axis. `deadline` says when to call `advance`."""
+
+    def __init__(self, axis: Axis, ports: Ports, registers: Settings, *, encoder: bool) -> None:
+        self._axis, self._ports, self._settings, self._encoder = axis, ports, registers, encoder
+        self.reset()
+
+    def reset(self) -> None:
+        """At rest, position 0, current at hold."""
+        self.course = Course.REST
+        self.phase_origin = self._axis.shaft  # where the step sequence was at its start phase
+        self.rested_at: Ns = -NEVER  # when the last motion ended
+        self._origin = self._axis.shaft
+        self._stopping = False  # on the way to rest, by a soft stop, M 0 or a new direction
+        self._reversed: int | None = None  # M has turned: the period, with its sign, to go on with after the stop
+        self._down_from = 0  # the pulse of an index at which its down ramp begins
+        self._ramp_end = 0  # the pulse at which a constant velocity is reached
+        self._target = 0  # period of the constant velocity or jog, in ticks, with its sign
+        self._home = 0  # the direction in which home is approached at last
+        self._home_period = 0
+        self._trip: int | None = None
+        self._step_fell: Ns = -NEVER
+        self._stepped: Ns = -NEVER
+        self.step_period: Ns = NEVER  # between the last two external steps
+
+    # -- looking -----------------------------------------------------------------------------------------
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves."""
+        return self.course is Course.REST
+
+    @property
+    def indexing(self) -> bool:
+        """Whether an index or a homing is under way: what W waits for."""
+        return self.course in _INDEXING
+
+    def completing(self, now: Ns) -> bool:
+        """Whether an action is in its completion cycle (page 27)."""
+        if self.course is Course.VELOCITY:
+            return self._stopping or self._axis.given(now) < self._ramp_end
+        return self.indexing
+
+    @property
+    def status(self) -> int:
+        """What ^ prints: 0 at rest, 1 indexing or homing, 3 constant velocity or jog, ramps included."""
+        if self.at_rest:
+            return 0
+        return 1 if self.indexing else 3
+
+    def position(self, now: Ns) -> int:
+        """The position counter."""
+        return wrapped(self._axis.shaft_at(now) - self._origin)
+
+    def period(self, now: Ns) -> int:
+        """Ticks between the pulses before and after `now`; 0 at rest."""
+        train = self._axis.train
+        return 0 if train is None else timer_table.period_after(train, self._axis.given(now))
+
+    @property
+    def deadline(self) -> Ns:
+        """When something happens by itself."""
+        return min(self._axis.deadline, self._ports.deadline)
+
+    def next_change(self, now: Ns) -> Ns:
+        """When the position changes next by itself."""
+        train = self._axis.train
+        return NEVER if train is None else train.time_of(self._axis.given(now) + 1)
+
+    # -- the counter and the trip position ---------------------------------------------------------------
+
+    def set_origin(self, position: int, now: Ns) -> None:
+        """O: the counter takes a value; the distance of a move under way stays (page 47)."""
+        self._origin = self._axis.shaft_at(now) - position
+        self._remark(now)
+
+    def set_trip(self, position: int | None, now: Ns) -> None:
+        """Tell when the counter reaches this position; None: never."""
+        self._trip = position
+        self._remark(now)
+
+    # -- starting ----------------------------------------------------------------------------------------
+
+    def index(self, steps: int, direction: int, now: Ns) -> None:
+        """+, - and R, at rest. No steps into an active limit."""
+        if not steps or self._ports.limit(direction):
+            return
+        move = timer_table.index(self._settings.speeds, steps)
+        self.course, self._down_from = Course.INDEX, steps - move.down
+        self._start(move.train, direction, now)
+
+    def ready_to_index(self, now: Ns) -> bool:
+        """Whether an index may start now; a constant velocity begins to ramp down for it."""
+        if self.course is Course.VELOCITY and not self._stopping:
+            self.soft_stop(now)
+        return self.at_rest
+
+    def velocity(self, count: int, now: Ns) -> None:
+        """M, when the ramp before it is complete: a timer count with its sign, 0 stops."""
+        period = count * self._settings.divide
+        if self.course is Course.VELOCITY:
+            if period == 0:
+                self.soft_stop(now)
+            elif (period > 0) is (self._axis.direction > 0):
+                self._change(abs(period), now)
+            else:
+                self.soft_stop(now)
+                if self.at_rest:
+                    self._begin_velocity(period, Course.VELOCITY, now)
+                else:
+                    self._reversed = period
+        elif period:
+            self._begin_velocity(period, Course.VELOCITY, now)
+
+    def home(self, count: int, direction: int, now: Ns) -> None:
+        """F, at rest. The low edge is looked for in `direction`, the high edge the other way."""
+        self._home = -direction
+        self._home_period = max(count, self._settings.initial) * self._settings.divide
+        if self._ports.active("HOME"):
+            self._approach_home(self._settings.initial * self._settings.divide, now)
+        elif not self._ports.limit(direction):
+            self.course = Course.SEEK_LOW
+            self._run(direction * count * self._settings.divide, now)
+
+    def jog(self, direction: int, fast: bool, now: Ns) -> None:
+        """The jog inputs ask for this direction (0: none) and speed, at rest or while jogging."""
+        unit = self._settings.jog[fast] * JOG_UNIT * settings.RESOLUTION[self._settings.resolution]
+        period = timer_table.count_of(unit) * self._settings.divide if unit else 0
+        if self.course is Course.JOG:
+            if self._stopping:
+                return
+            if not unit or direction != self._axis.direction:
+                self.soft_stop(now)
+            elif period != abs(self._target):
+                self._change(period, now)
+        elif unit and direction and not self._ports.limit(direction):
+            self._begin_velocity(direction * period, Course.JOG, now)
+
+    @property
+    def jogging(self) -> bool:
+        """Whether the axis follows the jog inputs."""
+        return self.course is Course.JOG
+
+    # -- stopping ----------------------------------------------------------------------------------------
+
+    def soft_stop(self, now: Ns) -> None:
+        """Decelerate by K to the initial speed and stop; the pulse that is on its way keeps its time."""
+        train = self._axis.train
+        if train is None:
+            return
+        self._reversed = None
+        if self._stopping:
+            return
+        given = self._axis.given(now)
+        if self.course is Course.INDEX and given >= self._down_from:
+            return  # it stops of itself
+        change = timer_table.change(0, self._settings.speeds, timer_table.period_after(train, given), None)
+        steps = given + 1 + change.ramp
+        if train.steps is not None and steps >= train.steps:
+            return
+        self._stopping = True
+        head = train.head(given + 1)
+        base = head.fixed_time(given + 1) - train.start
+        stop = Train((*head.segments, *(segment.moved(base) for segment in change.segments)), train.start)
+        self._axis.replan(stop, (), now)
+        self._remark(now)
+
+    def halt(self, now: Ns) -> None:
+        """ESC, a limit: the pulses stop at once."""
+        if self._axis.moving:
+            self._axis.cut(now)
+        self._finish(now)
+
+    # -- inputs ------------------------------------------------------------------------------------------
+
+    def input_changed(self, pin: str, level: Level, now: Ns) -> News:
+        """A switch or the step inputs have a new level, which `Ports` knows already."""
+        if pin in ("STEP", "DIR"):
+            return self._step_input(pin, level, now)
+        return self.switches_changed(now)
+
+    def switches_changed(self, now: Ns) -> News:
+        """Limits and home may have changed, by a level or by an option."""
+        if self.at_rest:
+            return NOTHING
+        if self._ports.limit(self._axis.direction):
+            if self._settings.flags & settings.GENTLE:
+                self.soft_stop(now)
+            else:
+                self.halt(now)
+            return ENDED if self.at_rest else NOTHING
+        low = self._ports.active("HOME")
+        if self.course is Course.SEEK_LOW and low:
+            self._axis.cut(now)
+            self.course = Course.REST
+            self._approach_home(self._home_period, now)
+        elif self.course is Course.SEEK_HIGH and not low:
+            self.halt(now)
+        return ENDED if self.at_rest else NOTHING
+
+    def advance(self, at: Ns) -> News:
+        """Deal with the deadline `at`; a step comes before whatever the outputs do."""
+        if self._axis.deadline > at:
+            self._ports.advance(at)
+            return NOTHING
+        _, pulse = self._axis.advance(at)
+        if self._axis.every_pulse:
+            self._ports.pulse(at)
+        tripped = self._trip is not None and self.position(at) == self._trip
+        if not self._axis.moving:
+            return News(self._ended(at), tripped)
+        return News(pulse == self._ramp_end and self.course is Course.VELOCITY, tripped)
+
+    # -- inside ------------------------------------------------------------------------------------------
+
+    def _start(self, train: Train, direction: int, now: Ns) -> None:
+        start = to_fixed(now + self._pre_energize(now))
+        self._stopping = False
+        self._ports.moving(True, direction, now)
+        self._axis.every_pulse = self._ports.pulses_are_wired
+        self._axis.start(train.at(start), direction, (), now)
+        self._remark(now)
+
+    def _pre_energize(self, now: Ns) -> Ns:
+        """w, if the current has fallen to hold (page 51)."""
+        fallen = now >= self.rested_at + SETTLING
+        return self._settings.pre_energize * 10 * MS if fallen else 0
+
+    def _run(self, period: int, now: Ns) -> None:
+        """Start from rest towards a constant period, in ticks with its sign."""
+        change = timer_table.change(0, self._settings.speeds, None, abs(period))
+        self._ramp_end, self._target = change.ramp, period
+        self._start(Train(change.segments), 1 if period > 0 else -1, now)
+
+    def _begin_velocity(self, period: int, course: Course, now: Ns) -> None:
+        if not self._ports.limit(1 if period > 0 else -1):
+            self.course = course
+            self._run(period, now)
+
+    def _approach_home(self, period: int, now: Ns) -> None:
+        """Without a ramp to the first high level of the home switch."""
+        if self._ports.limit(self._home):
+            self._finish(now)
+            return
+        self.course = Course.SEEK_HIGH
+        self._start(Train((Uniform(0, timer_table.TICK * period, 1, None),)), self._home, now)
+
+    def _change(self, period: int, now: Ns) -> None:
+        """From the speed of the next pulse to another in the same direction."""
+        train = self._axis.train
+        assert train is not None
+        given = self._axis.given(now)
+        change = timer_table.change(0, self._settings.speeds, timer_table.period_after(train, given), period)
+        head = train.head(given + 1)
+        base = head.fixed_time(given + 1) - train.start
+        self._ramp_end = given + 1 + change.ramp
+        self._target = period * self._axis.direction
+        plan = Train((*head.segments, *(segment.moved(base) for segment in change.segments)), train.start)
+        self._axis.replan(plan, (), now)
+        self._remark(now)
+
+    def _ended(self, at: Ns) -> bool:
+        """The last pulse was given. True unless a motion in the other direction follows."""
+        period, self._reversed = self._reversed, None
+        course = self.course
+        self._finish(at)
+        if period is not None:
+            self._begin_velocity(period, course, at)
+        return self.at_rest
+
+    def _finish(self, now: Ns) -> None:
+        if self.course is not Course.REST:
+            self.rested_at = now
+        self.course = Course.REST
+        self._stopping, self._reversed = False, None
+        self._ports.moving(False, self._axis.direction, now)
+
+    def _remark(self, now: Ns) -> None:
+        """Ask to be woken at the end of a ramp and at the trip position."""
+        if not self._axis.moving:
+            return
+        marks = [self._ramp_end] if self.course is Course.VELOCITY and not self._stopping else []
+        if self._trip is not None:
+            given = self._axis.given(now)
+            away = (self._trip - self.position(now)) * self._axis.direction % COUNTS
+            marks.append(given + (away or COUNTS))
+        self._axis.remark(tuple(sorted({mark for mark in marks if mark > 0})), now)
+
+    def _step_input(self, pin: str, level: Level, now: Ns) -> News:
+        """A step from outside: a rising edge, or with the encoder option an edge of A or B (page 10)."""
+        a, b = self._ports.levels["STEP"], self._ports.levels["DIR"]
+        if self._encoder:
+            # A leads B in plus direction: A equals B behind an edge of B, and differs behind one of A
+            direction = 1 if (a != b) is (pin == "STEP") else -1
+        elif pin == "DIR" or level == LOW:
+            if pin == "STEP":
+                self._step_fell = now
+            elif now - self._stepped < DIRECTION_HOLD:
+                pass  # too early: the step has been made in the direction of its edge
+            return NOTHING
+        else:
+            if now - self._step_fell < LEAST_STEP_LOW:
+                return NOTHING
+            direction = 1 if b == HIGH else -1
+        if now - self._stepped < LEAST_STEP_PERIOD or not self.at_rest or self._ports.limit(direction):
+            return NOTHING
+        self.step_period, self._stepped = now - self._stepped, now
+        self._axis.every_pulse = False
+        self._axis.start(Train((Uniform(-to_fixed(1), 1, 1, 1),), to_fixed(now)), direction, (), now)
+        self._axis.advance(now)
+        self.rested_at = now
+        return News(False, self._trip is not None and self.position(now) == self._trip)

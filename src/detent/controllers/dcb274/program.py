@@ -1,0 +1,185 @@
+"""Instructions in memory, and the SMC-27X2's language for the assembler.
+
+The manual gives the lengths of instructions but, apart from the op-code of ``@``, not their bytes. The op-code is
+the ASCII code less 40h, modulo 256, as its example on page 56 shows; FFh ends a program. The rest is ours (E):
+numbers little-endian, positions as 24-bit two's complement, speeds as timer counts with sign or direction in bit
+15, trace in bit 15 of G's address, the name of an axis behind ``|``.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from detent.assembler import NAME as LABEL_NAME
+from detent.assembler import ImageError, Language, Statement, StatementError
+from detent.controllers.dcb274 import commands
+from detent.controllers.dcb274.arguments import Address
+from detent.controllers.dcb274.commands import MODEL, ROWS, TABLE, Instruction, Op, Refusal
+
+END: Final = 0xFF
+AREAS: Final = (range(0, 193), range(256, 2048))  # where bytes of a program may stand (page 59)
+LONGEST: Final = max(row.length for row in TABLE)
+_BIT_15: Final = 0x80  # of the high byte
+
+OPCODES: Final = {(ord(row.letter) - 0x40) & 0xFF: row for row in TABLE if row.stored}
+
+
+class Damaged(ImageError):
+    """Bytes that hold no program; the text says at which byte, and why."""
+
+
+def allowed(address: int, length: int = 1) -> bool:
+    """Whether `length` bytes of a program may stand at `address`."""
+    return any(address in area and address + length <= area.stop for area in AREAS)
+
+
+def encode(instruction: Instruction) -> bytes:
+    """The bytes of an instruction that program mode stores."""
+    row = ROWS[instruction.op]
+    values = instruction.values
+    opcode = (ord(row.letter) - 0x40) & 0xFF
+    match instruction.op:
+        case Op.GO | Op.FIND_HOME:
+            word = row.arguments[0].pack(values[0])
+            return bytes((opcode, word[0], word[1] | (_BIT_15 if values[1] else 0)))
+        case _:
+            return bytes((opcode,)) + b"".join(a.pack(v) for a, v in zip(row.arguments, values, strict=True))
+
+
+def decode(data: bytes) -> Instruction | None:
+    """The instruction with which `data` begins; None if none does (FFh, a stranger, a number out of range)."""
+    row = OPCODES.get(data[0]) if data else None
+    if row is None or len(data) < row.length:
+        return None
+    rest = data[1 : row.length]
+    if row.op in (Op.GO, Op.FIND_HOME):
+        value = row.arguments[0].unpack(bytes((rest[0], rest[1] & ~_BIT_15)))
+        return None if value is None else Instruction(row.op, (value, rest[1] >> 7))
+    values: list[int] = []
+    for argument in row.arguments:
+        value = argument.unpack(rest[: argument.width])
+        if row.op is Op.TERMINATE and rest[0] == 0:
+            value = 0
+        if value is None:
+            return None
+        values.append(value)
+        rest = rest[argument.width :]
+    return Instruction(row.op, tuple(values))
+
+
+@dataclass(frozen=True, slots=True)
+class SmcLanguage:
+    """The SMC-27X2 as the assembler sees it (`detent.assembler.Language`).
+
+    Source is what goes on the wire, one command a line, with labels for the addresses of G, J, L and T (``J start 3``,
+    ``T 1000 trip``). ``P 128`` says where the next instruction stands, as it does in program mode; ``P`` with
+    anything behind a program (and ``P`` alone) writes the end mark FFh, as it does there.
+    """
+
+    model: str = MODEL
+    comment: str = ";"
+    areas: tuple[range, ...] = AREAS
+    blank: int = END
+    closed: bool = False
+
+    def parse(self, text: str) -> Statement[Instruction]:
+        """The statement in `text`; see `detent.assembler.Language`."""
+        row = commands.LETTERS.get(text[0])
+        if row is not None and row.op is Op.PROGRAM:
+            return self._origin(text)
+        text, label, offset = self._without_label(text)
+        try:
+            instruction = commands.parse(text)
+        except Refusal as error:
+            raise StatementError(str(error)) from error
+        found = ROWS[instruction.op]
+        if not found.stored:
+            raise StatementError(f"{found.letter} is not stored in a program; leave it out")
+        return Statement(instruction, label, offset)
+
+    def _origin(self, text: str) -> Statement[Instruction]:
+        try:
+            values = commands.parse(text).values
+        except Refusal as error:
+            raise StatementError(str(error)) from error
+        if text.strip() == "P":
+            return Statement(None)  # bytes between parts of a program are FFh, and so is the one behind it
+        return Statement(None, origin=values[0])
+
+    def _without_label(self, text: str) -> tuple[str, str | None, int]:
+        """The text with 0 for the label in its place, the label and where it stands; unchanged without one."""
+        row = commands.LETTERS.get(text[0])
+        if row is None:
+            return text, None, 0
+        for match in re.finditer(r"[^ ,]+", text[1:]):
+            place = len(re.findall(r"[^ ,]+", text[1 : 1 + match.start()]))
+            takes = place < len(row.arguments) and isinstance(row.arguments[place], Address)
+            if takes and LABEL_NAME.fullmatch(match[0]):
+                return f"{text[: 1 + match.start()]}0{text[1 + match.end() :]}", match[0], 1 + match.start()
+        return text, None, 0
+
+    def length(self, instruction: Instruction) -> int:
+        """As settled from the command reference."""
+        return ROWS[instruction.op].length
+
+    def target(self, instruction: Instruction) -> int | None:
+        """Where G, J, L and T lead, unless it is 2048, or the 0 that turns a trip off."""
+        place = self._place(instruction)
+        if place is None:
+            return None
+        value = instruction.values[place]
+        off = value == commands.BRANCH or (instruction.op is Op.TRIP and value == 0)
+        return None if off else value
+
+    def aimed(self, instruction: Instruction, address: int) -> Instruction:
+        """The same instruction, leading to `address`."""
+        place = self._place(instruction)
+        assert place is not None
+        values = list(instruction.values)
+        values[place] = address
+        return instruction._replace(values=tuple(values))
+
+    def _place(self, instruction: Instruction) -> int | None:
+        arguments = ROWS[instruction.op].arguments
+        return next((i for i, argument in enumerate(arguments) if isinstance(argument, Address)), None)
+
+    def encode(self, instruction: Instruction) -> bytes:
+        """See the module's docstring."""
+        return encode(instruction)
+
+    def decode(self, image: bytes) -> list[tuple[int, Instruction]]:
+        """The instructions of an image that starts at address 0; FFh and what nobody wrote is left out.
+
+        Of a whole NV memory (2 048 bytes) only the program areas are read.
+        """
+        found, address = [], 0
+        whole = len(image) == AREAS[-1].stop
+        while address < len(image):
+            if whole and not allowed(address):
+                address = AREAS[1].start
+            if image[address] == END:
+                address += 1
+                continue
+            instruction = decode(image[address : address + LONGEST])
+            if instruction is None or encode(commands.parse(commands.spell(instruction))) != image[
+                address : address + ROWS[instruction.op].length
+            ]:
+                raise Damaged(f"byte {address} holds {image[address]:02X}h, with which no instruction begins")
+            found.append((address, instruction))
+            address += ROWS[instruction.op].length
+        return found
+
+    def spell(self, instruction: Instruction, label: str | None = None) -> str:
+        """As Q lists it; with a label, as source has it."""
+        text = commands.spell(instruction)
+        place = self._place(instruction)
+        if label is None or place is None:
+            return text
+        words = text.split(" ")
+        words[1 + place] = label
+        return " ".join(words)
+
+
+def language() -> Language[Instruction]:
+    """The language for `detent.assembler`."""
+    return SmcLanguage()

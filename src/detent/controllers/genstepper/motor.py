@@ -1,0 +1,292 @@
+"""One motor's motion: go, slew, stop, and what happens when they meet (manual, pages 22, 27, 31 to 33, 36, 38).
+
+The motor is always in one `Action` with one `Plan` of `ramps.tick_accumulator`. A command that comes in motion
+takes the accumulators as they are on the tick, and plans on from there. Ticks are counted from the reset.
+"""
+
+from enum import Enum
+
+from detent.axis import Axis, Moment
+from detent.controllers.genstepper.link import LARGEST, saturated
+from detent.ramps.tick_accumulator import TICK, UPDATES, Plan, Point, slewing, stopping, toward
+from detent.ticks import NEVER, Ns, to_fixed
+
+LEAST_KEPT, DEFAULT_SLOPE, DEFAULT_RATE = 80, 8_000, 400  # what K, P and R make of 0
+ONE_STEP = toward(1, 0, UPDATES * UPDATES, UPDATES, 1, UPDATES, 1)  # a train of one tick with a step on it
+
+
+class Action(Enum):
+    """What the motor does."""
+
+    IDLE = "idle"
+    GOING = "going"  # towards a target: report -8 tells ramping up, at speed, slowing
+    SLEWING = "slewing"
+    STOPPING = "stopping"
+    REVERSING = "reversing"  # stops, then slews the other way
+    TURNING = "turning"  # stops, then goes to a target
+
+
+class Motor:
+    """One motor. `deadline` says when to call `advance`, which is True when the motor has come to rest."""
+
+    __slots__ = ("_axis", "_begin_tick", "_braking_slope", "_ends_at", "_go_keep", "_go_run", "_limit_tick", "_origin",
+                 "_plan", "_time_zero", "action", "deadline", "direction", "idle_windings", "keep", "mark", "mode",
+                 "rate", "slope", "target")  # fmt: skip
+
+    def __init__(self, axis: Axis) -> None:
+        self._axis = axis
+        self.reset(0, keep=LEAST_KEPT, slope=DEFAULT_SLOPE, rate=800, idle_windings=0)
+
+    def reset(self, now: Ns, *, keep: int, slope: int, rate: int, idle_windings: int) -> None:
+        """As after power-on: at rest, at position 0. Ticks are counted from `now`."""
+        if self._axis.moving:
+            self._axis.cut(now)
+        self._time_zero = now
+        self._origin = self._axis.shaft
+        self.action = Action.IDLE
+        self.deadline: Ns = NEVER
+        self.direction = 1
+        self.target = self.mark = 0
+        self.keep, self.slope, self.rate = keep, slope, rate
+        self.idle_windings, self.mode = idle_windings, 3
+        self._plan: Plan | None = None
+        self._begin_tick = 0  # of the plan
+        self._ends_at: Ns = NEVER
+        self._go_run = self._go_keep = self._braking_slope = 0  # as they were when G was given
+        self._limit_tick = -1  # the tick before which a limit was seen
+
+    # -- where it is -------------------------------------------------------------------------------------
+
+    @property
+    def idle(self) -> bool:
+        """Whether no motion is under way."""
+        return self.action is Action.IDLE
+
+    @property
+    def in_steps(self) -> bool:
+        """Whether it is stepping, and not between a stop and what follows."""
+        return self.action is not Action.IDLE
+
+    def position(self, now: Ns) -> int:
+        """The location, in microsteps."""
+        return self._axis.shaft_at(now) - self._origin
+
+    def pulses(self, now: Ns) -> int:
+        """How many steps were made since the board was made."""
+        return self._axis.pulses_at(now)
+
+    def speed(self, now: Ns) -> int:
+        """The rate in microsteps/s; the stop OK rate at rest."""
+        return self.keep if self._plan is None else self._point(now).rate
+
+    def seen_target(self, now: Ns) -> int:
+        """The target of a motion that has one, else the location."""
+        return self.target if self.action in (Action.GOING, Action.TURNING) else self.position(now)
+
+    def target_speed(self, now: Ns) -> int:
+        """The rate towards which the ramps lead."""
+        match self.action:
+            case Action.SLEWING:
+                return self.rate
+            case Action.GOING if self._plan is not None and self._tick(now) - self._begin_tick < self._plan.falls:
+                return self._go_run
+        return self.keep
+
+    def step_action(self, now: Ns) -> int:
+        """The number of what it does in report -8 (page 42)."""
+        if self._limit_tick >= self._tick(now):
+            return 8
+        match self.action:
+            case Action.IDLE:
+                return 0
+            case Action.GOING:
+                plan = self._plan
+                assert plan is not None
+                tick = self._tick(now) - self._begin_tick
+                return 1 if tick < plan.rises else 2 if tick < plan.falls else 3
+            case Action.SLEWING:
+                return 4
+            case Action.STOPPING:
+                return 5
+            case Action.REVERSING:
+                return 6
+        return 7
+
+    # -- commands ----------------------------------------------------------------------------------------
+
+    def go(self, target: int, now: Ns) -> None:
+        """Go to a position; from a motion by way of a stop ("The code ALWAYS starts from a stop")."""
+        self.target = saturated(target)
+        if self.action is Action.IDLE:
+            self._start_go(self._tick(now), now)
+        else:
+            self._stop_for(Action.TURNING, now)
+
+    def go_relative(self, steps: int, now: Ns) -> None:
+        """Go so far from the target of a motion that has one, else from here (page 33)."""
+        self.go(self.seen_target(now) + steps, now)
+
+    def slew(self, direction: int, now: Ns) -> None:
+        """Go in a direction until stopped."""
+        if self.action is Action.IDLE:
+            self._start_slew(direction, self._tick(now), now)
+        elif direction == self.direction:
+            self._continue_slew(now)
+        else:
+            self._stop_for(Action.REVERSING, now)
+
+    def stop(self, now: Ns) -> None:
+        """Z: down the ramp to the stop OK rate."""
+        if self.action is not Action.IDLE:
+            self._stop_for(Action.STOPPING, now)
+
+    def halt(self, now: Ns) -> None:
+        """Stop at once."""
+        if self._axis.moving:
+            self._axis.cut(now)
+        self._rest()
+
+    def limit(self, hard: bool, now: Ns) -> None:
+        """The limit ahead has closed: stop, for good."""
+        self._limit_tick = self._tick(now)
+        if hard:
+            self.halt(now)
+        else:
+            self.stop(now)
+
+    def set_rate(self, rate: int, now: Ns) -> None:
+        """R: a plain slew follows at once, anything else from its next motion on."""
+        self.rate = rate
+        if self.action is Action.SLEWING:
+            self._continue_slew(now)
+
+    def set_slope(self, slope: int, now: Ns) -> None:
+        """P: at once. A target move keeps the braking point that it computed (page 31)."""
+        self.slope = slope
+        if self.action is Action.GOING:
+            self._continue_go(now)
+        elif self.action is Action.SLEWING:
+            self._continue_slew(now)
+        elif self.action is not Action.IDLE:
+            self._stop_for(self.action, now)
+
+    def set_position(self, position: int, now: Ns) -> None:
+        """=: this place is `position`; then the motor stops."""
+        self._origin = self._axis.shaft_at(now) - position
+        self.stop(now)
+
+    def step(self, direction: int, now: Ns) -> None:
+        """One microstep at `now`, asked for by a pulse."""
+        self.direction = direction
+        if abs(self.position(now) + direction) <= LARGEST:
+            self._axis.start(ONE_STEP.train.at(to_fixed(now - TICK)), direction, (), now)
+            self._axis.advance(now)
+
+    # -- time --------------------------------------------------------------------------------------------
+
+    def advance(self, at: Ns) -> bool:
+        """A step of note falls due at `at`, or the plan is over. True when the motor has come to rest."""
+        if self._axis.deadline <= at:
+            self._axis.advance(at)
+        if self._ends_at <= at:
+            return self._end(at)
+        self._await()
+        return False
+
+    def wired(self) -> None:
+        """A wire leads from a winding to another device: every step is a moment of its own."""
+        self._axis.every_pulse = True
+
+    # -- plans -------------------------------------------------------------------------------------------
+
+    def _tick(self, now: Ns) -> int:
+        """The last tick up to and including `now`."""
+        return (now - self._time_zero) // TICK
+
+    def _point(self, now: Ns) -> Point:
+        assert self._plan is not None
+        return self._plan.point(self._tick(now) - self._begin_tick)
+
+    def _room(self, direction: int, now: Ns) -> int:
+        """How many steps there are to the end of the range of positions."""
+        return LARGEST - direction * self.position(now)
+
+    def _start_go(self, tick: int, now: Ns) -> None:
+        distance = self.target - self.position(now)
+        if distance == 0:
+            self._rest()
+            return
+        self._go_run, self._go_keep, self._braking_slope = self.rate, self.keep, self.slope
+        self.direction = 1 if distance > 0 else -1
+        speed = min(self._go_keep, self._go_run) * UPDATES
+        plan = toward(abs(distance), 0, speed, self._go_run, self.slope, self._go_keep, self._braking_slope)
+        self._follow(Action.GOING, plan, tick, now)
+
+    def _continue_go(self, now: Ns) -> None:
+        assert self._plan is not None
+        point, tick = self._point(now), self._tick(now)
+        left = abs(self.target - self.position(now))
+        braking = tick - self._begin_tick >= self._plan.falls + 1
+        self._follow(
+            Action.GOING,
+            toward(left, point.phase, point.speed, self._go_run, self.slope, self._go_keep, self._braking_slope,
+                   braking=braking),
+            tick, now,
+        )  # fmt: skip
+
+    def _start_slew(self, direction: int, tick: int, now: Ns) -> None:
+        self.direction = direction
+        room = self._room(direction, now)
+        if room == 0:
+            self._rest()
+            return
+        speed = min(self.keep, self.rate) * UPDATES
+        self._follow(Action.SLEWING, slewing(0, speed, self.rate, self.slope, room), tick, now)
+
+    def _continue_slew(self, now: Ns) -> None:
+        point = self._point(now)
+        plan = slewing(point.phase, point.speed, self.rate, self.slope, self._room(self.direction, now))
+        self._follow(Action.SLEWING, plan, self._tick(now), now)
+
+    def _stop_for(self, action: Action, now: Ns) -> None:
+        """Stop, then do what `action` says."""
+        point = self._point(now)
+        plan = stopping(point.phase, point.speed, self.slope, self.keep, self._room(self.direction, now))
+        self._follow(action, plan, self._tick(now), now)
+
+    def _follow(self, action: Action, plan: Plan, tick: int, now: Ns) -> None:
+        """Do what `plan` says, from `tick` on, which is not after `now`."""
+        if self._axis.moving:
+            self._axis.cut(now)
+        self.action, self._plan, self._begin_tick = action, plan, tick
+        if plan.ticks == 0:
+            self._end(now)
+            return
+        begin = self._time_zero + tick * TICK
+        self._ends_at = begin + plan.ticks * TICK
+        if plan.steps:
+            self._axis.start(plan.train.at(to_fixed(begin)), self.direction, (), now)
+        self._await()
+
+    def _end(self, now: Ns) -> bool:
+        """The plan is over: rest, or what was to follow the stop. True at rest."""
+        tick = self._tick(now)
+        if self.action is Action.TURNING:
+            self._start_go(tick, now)
+        elif self.action is Action.REVERSING:
+            self._start_slew(-self.direction, tick, now)
+        else:
+            self._rest()
+        return self.action is Action.IDLE
+
+    def _rest(self) -> None:
+        self.action = Action.IDLE
+        self._plan = None
+        self._ends_at = NEVER
+        self.deadline = NEVER
+
+    def _await(self) -> None:
+        self.deadline = min(self._axis.deadline, self._ends_at)
+
+
+__all__ = ["Action", "Moment", "Motor"]

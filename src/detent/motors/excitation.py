@@ -1,0 +1,130 @@
+"""From pulses and current commands to what the windings are asked for, change by change.
+
+Pulses are times (ns) and directions. A `Sequencer` keeps what a drive remembers between them: its place in the
+winding table, the rate it measures, the factor on the current. It makes the columns that `kernel.advance` takes.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from detent.motors.drive import FAST, SLOW, Drive
+from detent.ticks import NEVER, Ns
+
+Int64 = npt.NDArray[np.int64]
+
+
+class Changes(NamedTuple):
+    """Changes of excitation, in order of time: when, and what holds from then on."""
+
+    times: Int64
+    places: Int64
+    levels: npt.NDArray[np.float64]
+    rows: npt.NDArray[np.int64]
+    modes: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+
+class Sequencer:
+    """The logic between pulses and power stage, for a drive that decides about its decay and its current by itself.
+
+    `level` may be set by whoever has a wire to the drive (MOV and RAMP). Feed pulses in order of time; what falls due by itself
+    behind the last of them (standstill, hold current) comes with the next pulses, or with `up_to`.
+    """
+
+    __slots__ = ("drive", "last", "level", "mode", "place", "row", "stride", "_held", "_slowed")
+
+    def __init__(self, drive: Drive, place: int = 0, stride: int = 1) -> None:
+        self.drive = drive
+        self.place, self.row, self.mode = place, 0, drive.mode
+        self.stride = stride  # places a pulse
+        self.level = drive.currents.rest if drive.currents.after else drive.currents.ramp
+        self.last: Ns = -NEVER  # the last pulse
+        self._held = True
+        self._slowed = True
+
+    def pulses(self, times: Int64, directions: Int64 | int) -> Changes:
+        """The changes up to and including these pulses."""
+        count = len(times)
+        if not count:
+            return _changes([], [], [], [], [])
+        first = self.up_to(int(times[0]))
+        places = self.place + self.stride * np.cumsum(np.broadcast_to(np.asarray(directions, np.int64), (count,)))
+        levels = np.full(count, self._running())
+        modes = np.full(count, self.drive.mode, np.int64)
+        standstill = self.drive.standstill
+        if standstill < NEVER:
+            before = np.concatenate(([max(self.last, int(times[0]) - 2 * standstill)], times[:-1]))
+            modes[times - before < standstill] = FAST
+        change = Changes(times, places, levels, np.full(count, self.row, np.int64), modes)
+        after = self.drive.currents.after
+        wanted = min(standstill, after or NEVER)
+        gaps = np.flatnonzero(np.diff(times) > wanted) if wanted < NEVER else np.empty(0, np.int64)
+        self.place, self.level, self.mode = int(places[-1]), float(levels[-1]), int(modes[-1])
+        self.last = int(times[-1])
+        self._held, self._slowed = not after, self.mode == self.drive.mode
+        if len(gaps):
+            change = self._with_pauses(change, gaps)
+        return joined(first, change)
+
+    def up_to(self, until: Ns) -> Changes:
+        """What the drive does by itself between the last pulse and `until`, which is included."""
+        due = [(at, what) for at, what in ((self.slows_at, "slow"), (self.holds_at, "hold")) if at <= until]
+        rows = []
+        for at, what in sorted(due):
+            if what == "slow":
+                self._slowed, self.mode = True, SLOW
+            else:
+                self._held, self.level = True, self.drive.currents.rest
+            rows.append((at, self.place, self.level, self.row, self.mode))
+        return _changes(*zip(*rows, strict=True)) if rows else _changes([], [], [], [], [])
+
+    def set_level(self, level: float, at: Ns) -> Changes:
+        """Somebody outside sets the factor on the current."""
+        first = self.up_to(at)
+        self.level = level
+        return joined(first, _changes([at], [self.place], [level], [self.row], [self.mode]))
+
+    @property
+    def slows_at(self) -> Ns:
+        """When an `auto` drive notices that the motor stands."""
+        return NEVER if self._slowed else self.last + self.drive.standstill
+
+    @property
+    def holds_at(self) -> Ns:
+        """When the current falls to its hold value."""
+        return NEVER if self._held else self.last + self.drive.currents.after
+
+    def _running(self) -> float:
+        return self.drive.currents.ramp if self.drive.currents.after else self.level
+
+    def _with_pauses(self, change: Changes, gaps: Int64) -> Changes:
+        """Add what falls due in pauses between these pulses."""
+        parts, begin = [], 0
+        mine = (self.place, self.level, self.mode, self.last, self._held, self._slowed)
+        for gap in gaps.tolist():
+            parts.append(Changes(*(column[begin : gap + 1] for column in change)))
+            self.place, self.level, self.mode = int(change.places[gap]), float(change.levels[gap]), int(change.modes[gap])
+            self.last = int(change.times[gap])
+            self._held, self._slowed = not self.drive.currents.after, self.mode == self.drive.mode
+            parts.append(self.up_to(int(change.times[gap + 1])))
+            begin = gap + 1
+        parts.append(Changes(*(column[begin:] for column in change)))
+        self.place, self.level, self.mode, self.last, self._held, self._slowed = mine
+        return joined(*parts)
+
+
+def joined(*parts: Changes) -> Changes:
+    """One run of changes after the other."""
+    some = [part for part in parts if len(part)]
+    if len(some) == 1:
+        return some[0]
+    return Changes(*(np.concatenate(columns) for columns in zip(*some, strict=True))) if some else parts[0]
+
+
+def _changes(times, places, levels, rows, modes) -> Changes:  # type: ignore[no-untyped-def]
+    return Changes(np.array(times, np.int64), np.array(places, np.int64), np.array(levels, np.float64),
+                   np.array(rows, np.int64), np.array(modes, np.int64))  # fmt: skip

@@ -1,0 +1,153 @@
+"""One motor with its drive and its load, in motion: the state of the equations, and what can be asked of it."""
+
+from dataclasses import dataclass, field
+from math import asin, atan2, ceil, floor, hypot, inf, pi
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from detent.motors import engine, kernel
+from detent.motors.drive import Drive
+from detent.motors.excitation import Changes, Sequencer
+from detent.motors.load import Load
+from detent.motors.motor import Motor, MotorError, Shared
+from detent.ticks import US, Ns
+
+SUBSTEP: Ns = 20 * US
+FINE: Ns = 10 * US  # for verdicts that are printed
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig(Shared):
+    """Motor, drive and load together, as the kernel takes them. MotorError if they do not go together."""
+
+    motor: Motor
+    drive: Drive
+    load: Load = Load()
+    substep: Ns = SUBSTEP
+    parameters: Floats = field(init=False)
+    table_a: Floats = field(init=False)
+    table_b: Floats = field(init=False)
+    by_time: Floats = field(init=False)
+    by_position: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        motor, drive, load = self.motor, self.drive, self.load
+        drive.check(motor)
+        resistance = motor.resistance + drive.resistance
+        inertia = motor.rotor + load.inertia
+        winding = drive.winding
+        # a substep must be short beside the winding's time constant, and beside the rotor's swing
+        fastest = max((motor.teeth * motor.holding_torque / inertia) ** 0.5, 1e-9)
+        limit = min(0.5 * motor.real_inductance / resistance, 0.1 / fastest)
+        if limit < 1e-7:
+            raise MotorError(
+                f"motor {motor.name}: L / R of {motor.real_inductance / resistance:.2g} s, or the inertia of {inertia:.2g} kg m2, "
+                "is too small to be a motor's: check the units (H, kg m2)"
+            )
+        set_ = object.__setattr__
+        set_(self, "substep", min(self.substep, floor(limit * 1e9)))
+        par = np.zeros(kernel.PARAMETERS)
+        par[kernel.R], par[kernel.L] = resistance, motor.real_inductance
+        par[kernel.KT], par[kernel.TEETH], par[kernel.J] = motor.torque_constant, motor.teeth, inertia
+        par[kernel.B], par[kernel.TC], par[kernel.TL] = motor.viscous + load.viscous, load.friction, load.torque
+        par[kernel.TD], par[kernel.VOLTS], par[kernel.AMPS] = motor.detent_torque, drive.volts, drive.current
+        par[kernel.PITCH], par[kernel.OFFSET] = winding.pitch, winding.offset
+        par[kernel.GAIN] = resistance
+        par[kernel.T_START], par[kernel.T_STEP] = load.torque_by_time[:2]
+        par[kernel.P_START], par[kernel.P_STEP] = load.torque_by_position[:2]
+        if load.is_steady:
+            par[kernel.TL] = load.at_rest()
+        set_(self, "parameters", par)
+        set_(self, "table_a", np.array([winding.a]))
+        set_(self, "table_b", np.array([winding.b]))
+        set_(self, "by_time", np.array(load.torque_by_time.values))
+        set_(self, "by_position", np.array(load.torque_by_position.values))
+
+    def at_rest(self, place: int, level: float, now: Ns = 0) -> tuple[Floats, npt.NDArray[np.int64]]:
+        """The state in which the rotor stands still under its load, current flowing.
+
+        MotorError if the load is more than the motor can hold.
+        """
+        winding, motor = self.drive.winding, self.motor
+        at = place % len(winding)
+        ia, ib = (self.drive.current * level * table[at] for table in (winding.a, winding.b))
+        s, n = np.zeros(kernel.FLOATS), np.zeros(kernel.INTEGERS, np.int64)
+        s[kernel.IA], s[kernel.IB], s[kernel.LEVEL] = ia, ib, level
+        field_angle = atan2(winding.b[at], winding.a[at])
+        angle = winding.angle(place)
+        angle += (field_angle - angle + pi) % (2 * pi) - pi  # the table's vector may point elsewhere than its place
+        most = motor.torque_constant * hypot(ia, ib)
+        torque, friction = self.load.at_rest(), self.load.friction
+        pull = max(abs(torque) - friction, 0.0)
+        if pull and pull >= most:
+            raise MotorError(
+                f"a load of {torque:g} Nm is more than the {most:.3g} Nm that {motor.name} holds at rest with "
+                f"{self.drive.current * level:.3g} A: lower the load or raise the current"
+            )
+        s[kernel.X] = angle - (asin(pull / most) * (1 if torque > 0 else -1) if pull else 0.0)
+        n[kernel.NOW], n[kernel.PLACE], n[kernel.MODE] = now, place, self.drive.mode
+        n[kernel.LOST_PULSE] = -1
+        return s, n
+
+
+class Rotor:
+    """A rig in motion. Copies go on identically."""
+
+    __slots__ = ("n", "parameters", "rig", "s")
+
+    def __init__(self, rig: Rig, sequencer: Sequencer, now: Ns = 0, sample: Ns = 0) -> None:
+        self.rig = rig
+        self.parameters = rig.parameters.copy()
+        self.parameters[kernel.SAMPLE] = sample
+        self.s, self.n = rig.at_rest(sequencer.place, sequencer.level, now)
+
+    @property
+    def now(self) -> Ns:
+        """The time of the state."""
+        return int(self.n[kernel.NOW])
+
+    @property
+    def angle(self) -> float:
+        """Electrical angle, rad."""
+        return float(self.s[kernel.X])
+
+    @property
+    def steps(self) -> float:
+        """Where the rotor is, in places of the winding table."""
+        return (self.angle - self.rig.drive.winding.offset) / self.rig.drive.winding.pitch
+
+    @property
+    def speed(self) -> float:
+        """rad/s of the shaft."""
+        return float(self.s[kernel.W])
+
+    def run(self, changes: Changes, until: Ns, low: float = -inf, high: float = inf, trace: Floats | None = None) -> int:
+        """Go on through these changes to `until`; see `kernel.advance`. MotorError if the equations break."""
+        rig = self.rig
+        code: int = engine.advance()(
+            self.s, self.n, *changes, until, rig.table_a, rig.table_b, self.parameters, rig.by_time, rig.by_position,
+            low, high, _NO_TRACE if trace is None else trace, rig.substep,
+        )  # fmt: skip
+        if code == kernel.BROKEN:
+            raise MotorError(
+                f"the rotor of {rig.motor.name} runs away at {self.now / 1e9:g} s: no load and nothing that holds it; "
+                "check torque and inertia of the load"
+            )
+        return code
+
+    def __deepcopy__(self, memo: Any) -> "Rotor":
+        twin = object.__new__(Rotor)
+        twin.rig, twin.parameters, twin.s, twin.n = self.rig, self.parameters, self.s.copy(), self.n.copy()
+        return twin
+
+
+def substeps(span: Ns, changes: int, substep: Ns) -> int:
+    """About how many substeps that takes."""
+    return ceil(span / substep) + changes
+
+
+_NO_TRACE = np.zeros((0, kernel.COLUMNS))

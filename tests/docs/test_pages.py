@@ -1,0 +1,158 @@
+"""The pages are true: generated parts are up to date, links lead somewhere, proofs exist, keys are those of the code."""
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from pydantic import AliasChoices, BaseModel
+
+from detent.cell import description
+from detent.cell.build import build
+from detent.cell.description import Problem, parse
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
+GSC200 = (DOCS / "controllers" / "gsc200.md").read_text()
+
+
+def generator() -> ModuleType:
+    found = importlib.util.spec_from_file_location("generate", DOCS / "generate.py")
+    assert found is not None
+    assert found.loader is not None
+    module = importlib.util.module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
+
+
+def test_make_docs_would_change_nothing() -> None:
+    generate = generator()
+    assert generate.pages() == PAGES
+    old = [name for name, page in zip(NAMES, PAGES, strict=True) if generate.page(page.read_text()) != page.read_text()]
+    assert not old, "run `make docs`"
+
+
+def test_every_generated_part_has_its_place() -> None:
+    generate = generator()
+    assert sorted(name for page in PAGES for name in generate.names(page.read_text())) == sorted(generate.PARTS)
+
+
+def anchors(page: Path) -> set[str]:
+    """The headings of a page as links name them."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_links_lead_somewhere(page: Path) -> None:
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" in target:
+            continue
+        place, _, anchor = target.partition("#")
+        other = (page.parent / place).resolve() if place else page
+        assert other.exists(), target
+        assert not anchor or anchor in anchors(other), target
+
+
+def test_every_page_is_found_from_the_index() -> None:
+    index = (DOCS / "index.md").read_text()
+    for page in PAGES:
+        if page.name != "index.md":
+            assert f"({page.relative_to(DOCS)})" in index, page.name
+
+
+def rulings() -> list[list[str]]:
+    """The rows of the tables behind `<!-- rulings -->`."""
+    found = []
+    for part in GSC200.split("<!-- rulings -->")[1:]:
+        lines = [line for line in part.split("\n### ")[0].splitlines() if line.startswith("|")]
+        found += [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+    return found
+
+
+def scenes() -> dict[str, list[str]]:
+    """The titles of the scenes of every dialogue file."""
+    folder = ROOT / "tests" / "dialogues" / "gsc200"
+    return {path.name: re.findall(r"^scene (.+)$", path.read_text(), re.MULTILINE) for path in folder.glob("*.txt")}
+
+
+def test_every_ruling_has_a_proof_that_exists() -> None:
+    assert len(rulings()) > 60
+    functions = {
+        name for path in (ROOT / "tests").rglob("test_*.py") for name in re.findall(r"def (test_\w+)", path.read_text())
+    }
+    titles = scenes()
+    missing = []
+    for subject, *_, proof in rulings():
+        named = re.findall(r"`(test_\w+)`", proof)
+        missing += [f"{subject}: {name}" for name in named if name not in functions]
+        told = re.findall(r"`(\w+\.txt)`: (.+?)(?=, `|$)", proof)
+        missing += [
+            f"{subject}: {file}: {title}"
+            for file, title in told
+            if not any(scene.startswith(title) for scene in titles.get(file, []))
+        ]
+        assert named or told or "code" in proof, subject
+    assert not missing
+
+
+TABLES = {
+    "The file": description.Description,
+    "Units": description.Unit,
+    "Wires": description.Wire,
+    "Switches": description.Switch,
+    "Lines": description.Line,
+    "Script": description.ScriptEntry,
+}
+
+
+def written(model: type[BaseModel]) -> dict[str, str]:
+    """The keys of a table with their defaults, as the page writes them."""
+    keys = {}
+    for name, field in model.model_fields.items():
+        alias = field.validation_alias
+        key = str(alias.choices[0]) if isinstance(alias, AliasChoices) else name
+        default = field.get_default(call_default_factory=True)
+        if field.is_required():
+            keys[key] = "required"
+        elif default in (None, {}, [], ""):
+            keys[key] = ""
+        else:
+            keys[key] = str(default).lower()
+    keys.pop("file", None)
+    return keys
+
+
+@pytest.mark.parametrize("title", TABLES)
+def test_the_reference_of_cell_files_has_every_key_with_its_default(title: str) -> None:
+    text = (DOCS / "how-to" / "cells.md").read_text()
+    section = text.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| `(\w+)` \| [^|]+ \|([^|]*)\|", section, re.MULTILINE)
+    assert {key: default.strip() for key, default in rows} == written(TABLES[title])
+
+
+def refusal(text: str) -> str:
+    with pytest.raises(Problem) as caught:
+        build(parse(text, "cell.toml"), lambda file: "")
+    return str(caught.value)
+
+
+def test_pin_10_must_be_grounded() -> None:
+    """Pin description: pin 10 "must be connected to pin 8"."""
+    text = "[units.a]\nmodel = 'gs-c200'\nstraps = { TEST = 'high' }\n"
+    assert "pin 10 (TEST) of a must be tied to ground" in refusal(text)
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_a_line_has_one_pull_down(level: int) -> None:
+    """Pin description, pin 13: open on all modules of a multipoint line except the terminator."""
+    units = "".join(
+        f"[units.{name}]\nmodel = 'gs-c200'\nstraps = {{ SEL2 = {sel}, SEL1 = 0, SEL0 = 0, TXPD = {level} }}\n"
+        for name, sel in (("a", 0), ("b", 1))
+    )
+    assert "TXPD must be tied to TXD on one unit of a line" in refusal(f"{units}[lines.bus]\nunits = ['a', 'b']\n")

@@ -1,0 +1,152 @@
+import os
+import select
+import termios
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from tests.realtime.ticking import TickingCell, look
+
+from detent.realtime.endpoints.endpoint import MOST_WAITING, EndpointError
+from detent.realtime.endpoints.pty import PseudoTerminal
+from detent.realtime.loop import Loop
+from detent.realtime.pace import Pace
+
+
+@contextmanager
+def served(terminal: PseudoTerminal, cell: TickingCell) -> Iterator[Loop]:
+    loop = Loop(cell, Pace(), [(0, terminal)], wait=look)
+    try:
+        yield loop
+    finally:
+        loop.close()
+        terminal.close()
+
+
+def opened(address: str) -> int:
+    return os.open(address, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+
+
+def answer(loop: Loop, client: int, length: int) -> bytes:
+    """What the client reads: `length` bytes, however many steps that takes."""
+    data = b""
+    while len(data) < length:
+        loop.step()
+        if select.select([client], [], [], 0)[0]:
+            data += os.read(client, length - len(data))
+    return data
+
+
+def test_a_client_is_answered() -> None:
+    terminal = PseudoTerminal()
+    with served(terminal, TickingCell(None)) as loop:
+        client = opened(terminal.address)
+        os.write(client, b"V1\x17\r\x80\xff\x03\x13\n")
+        assert answer(loop, client, 9) == b"V1\x17\r\x80\xff\x03\x13\n"
+        os.close(client)
+
+
+def test_clients_come_and_go() -> None:
+    terminal, cell = PseudoTerminal(), TickingCell(None)
+    with served(terminal, cell) as loop:
+        for text in (b"one\r", b"two\r", b"three\r"):
+            client = opened(terminal.address)
+            os.write(client, text)
+            assert answer(loop, client, len(text)) == text
+            os.close(client)
+        loop.step()
+    assert cell.got() == b"one\rtwo\rthree\r"
+
+
+def test_a_client_that_leaves_inside_a_frame_leaves_what_it_said_on_the_line() -> None:
+    terminal, cell = PseudoTerminal(), TickingCell(None)
+    with served(terminal, cell) as loop:
+        client = opened(terminal.address)
+        os.write(client, b"G+5")
+        os.close(client)
+        while cell.got() != b"G+5":
+            loop.step()
+
+
+def test_a_client_may_set_the_format_of_the_controller() -> None:
+    terminal = PseudoTerminal()
+    with served(terminal, TickingCell(None)) as loop:
+        client = opened(terminal.address)
+        settings = termios.tcgetattr(client)
+        settings[2] |= termios.PARENB | termios.PARODD | termios.CSTOPB
+        settings[4] = settings[5] = termios.B9600
+        termios.tcsetattr(client, termios.TCSAFLUSH, settings)
+        os.write(client, b"F\r")
+        assert answer(loop, client, 2) == b"F\r"
+        os.close(client)
+
+
+def test_a_client_that_does_not_read_loses_the_oldest_bytes_and_stops_nobody() -> None:
+    terminal, cell = PseudoTerminal(), TickingCell(None)
+    with served(terminal, cell):
+        told = 0
+        while not terminal.dropped:
+            terminal.send(b"%07d\r" % told, 0)
+            told += 1
+        assert told * 8 > MOST_WAITING
+        client = opened(terminal.address)
+        tty.setraw(client, termios.TCSANOW)  # without flushing what waits there
+        read = b""
+        while not read.endswith(b"%07d\r" % (told - 1)):
+            terminal.flush()
+            if select.select([client], [], [], 0)[0]:
+                read += os.read(client, 4096)
+        assert len(read) == told * 8 - terminal.dropped
+        assert not terminal.writing()
+        os.close(client)
+
+
+def test_a_link_leads_to_the_terminal_while_it_is_served(tmp_path: Path) -> None:
+    link = tmp_path / "stepper"
+    terminal = PseudoTerminal(link)
+    assert terminal.address == str(link)
+    assert os.readlink(link).startswith("/dev/")
+    with served(terminal, TickingCell(None)) as loop:
+        client = opened(str(link))
+        os.write(client, b"F\r")
+        assert answer(loop, client, 2) == b"F\r"
+        os.close(client)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_that_was_left_behind_is_replaced(tmp_path: Path) -> None:
+    link = tmp_path / "stepper"
+    link.symlink_to("/dev/pts/gone")
+    terminal = PseudoTerminal(link)
+    assert os.readlink(link) != "/dev/pts/gone"
+    terminal.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_that_somebody_took_over_is_left_alone(tmp_path: Path) -> None:
+    link = tmp_path / "stepper"
+    terminal = PseudoTerminal(link)
+    other = PseudoTerminal(link)
+    terminal.close()
+    terminal.close()
+    assert link.is_symlink()
+    other.close()
+    assert not link.is_symlink()
+
+
+def test_a_file_is_never_replaced_by_a_link(tmp_path: Path) -> None:
+    link = tmp_path / "stepper"
+    link.write_text("precious")
+    with pytest.raises(EndpointError, match=r"stepper exists and is not a symbolic link; remove it or choose"):
+        PseudoTerminal(link)
+    assert link.read_text() == "precious"
+
+
+def test_a_link_needs_a_folder(tmp_path: Path) -> None:
+    with pytest.raises(EndpointError, match="cannot be made: No such file or directory; choose another LINK"):
+        PseudoTerminal(tmp_path / "nowhere" / "stepper")
+    (tmp_path / "file").touch()
+    with pytest.raises(EndpointError, match="Not a directory; choose another LINK"):
+        PseudoTerminal(tmp_path / "file" / "stepper")

@@ -1,0 +1,193 @@
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from detent.realtime import images as module
+from detent.realtime.images import (
+    Images,
+    ImagesUnusable,
+    ImageUnreadable,
+    cell_name,
+    default_folder,
+    pack,
+    unpack,
+)
+
+IMAGE = bytes(range(119))
+MODELS = {"bar": "gs-c200", "drill": "gs-c200s"}
+
+
+class Kept(Images):
+    """Images that note their warnings."""
+
+    def __init__(self, folder: Path) -> None:
+        self.warnings: list[str] = []
+        super().__init__(folder, "cell", MODELS, warn=self.warnings.append)
+
+
+@pytest.fixture
+def images(tmp_path: Path) -> Iterator[Kept]:
+    made = Kept(tmp_path)
+    yield made
+    made.close()
+
+
+@given(st.binary(max_size=300), st.text(max_size=20))
+def test_what_is_packed_comes_out_again(image: bytes, model: str) -> None:
+    model = model.encode("utf-8", "replace").decode()
+    assert unpack(pack(image, model), model) == image
+
+
+@given(st.integers(0, len(pack(IMAGE, "gs-c200")) - 1), st.integers(1, 255))
+def test_no_damaged_byte_goes_unnoticed(index: int, change: int) -> None:
+    data = bytearray(pack(IMAGE, "gs-c200"))
+    data[index] ^= change
+    with pytest.raises(ImageUnreadable):
+        unpack(bytes(data), "gs-c200")
+
+
+@given(st.integers(0, len(pack(IMAGE, "gs-c200")) - 1))
+def test_no_missing_end_goes_unnoticed(length: int) -> None:
+    with pytest.raises(ImageUnreadable):
+        unpack(pack(IMAGE, "gs-c200")[:length], "gs-c200")
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (b"", "no EEPROM image of Detent"),
+        (pack(IMAGE, "gs-c200")[:10], "cut short"),
+        (pack(IMAGE, "gs-c200") + b"x", "has 147 bytes instead of 146"),
+        (pack(IMAGE, "gs-c200s"), "belongs to a gs-c200s, not a gs-c200"),
+        (module.MAGIC + b"\0\2" + bytes(20), "version 2, and only version 1"),
+        (pack(IMAGE, "gs-c200")[:-1] + b"x", "checksum is wrong"),
+    ],
+)
+def test_what_is_wrong_is_said(data: bytes, says: str) -> None:
+    with pytest.raises(ImageUnreadable, match=says):
+        unpack(data, "gs-c200")
+
+
+def test_what_was_saved_is_there_the_next_time(tmp_path: Path) -> None:
+    images = Kept(tmp_path)
+    assert images.load() == ({}, [])
+    assert images.save("drill", b"old")
+    assert images.save("drill", IMAGE)
+    images.close()
+    images = Kept(tmp_path)
+    assert images.load() == ({"drill": IMAGE}, [])
+    images.close()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cell.drill.eeprom", "cell.lock"]
+
+
+def test_a_damaged_image_is_moved_aside_and_never_overwritten(images: Kept) -> None:
+    path = images.path("bar")
+    for number, content in enumerate((b"first", b"second"), 1):
+        path.write_bytes(content)
+        found = images.load()
+        aside = path.with_name(f"cell.bar.eeprom.damaged-{number}")
+        assert found.images == {}
+        assert found.reports == [f"{path}: it is no EEPROM image of Detent; it is {aside} now, and bar starts empty"]
+        assert aside.read_bytes() == content
+        assert not path.exists()
+
+
+def test_what_cannot_be_read_is_moved_aside(images: Kept) -> None:
+    images.path("bar").mkdir()
+    found = images.load()
+    assert found.images == {}
+    assert "Is a directory; it is " in found.reports[0]
+    assert images.save("bar", IMAGE)
+
+
+def test_what_cannot_be_moved_aside_is_said(images: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_rename(*_: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    images.path("bar").write_bytes(b"?")
+    monkeypatch.setattr(Path, "rename", no_rename)
+    assert "it cannot be moved aside (Read-only file system), and bar starts empty" in images.load().reports[0]
+
+
+@pytest.mark.parametrize("function", ["replace", "fsync"])
+def test_a_failed_save_keeps_the_old_image_and_warns_once(
+    images: Kept, monkeypatch: pytest.MonkeyPatch, function: str
+) -> None:
+    assert images.save("bar", b"old")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, function, full)
+        assert not images.save("bar", IMAGE)
+        assert not images.save("bar", IMAGE)
+    path = images.path("bar")
+    assert images.warnings == [f"{path}: not written: No space left on device; the image before it is kept"]
+    assert images.load() == ({"bar": b"old"}, [])
+    assert sorted(p.name for p in path.parent.iterdir()) == ["cell.bar.eeprom", "cell.lock"]
+    assert images.save("bar", IMAGE)
+    assert images.load().images == {"bar": IMAGE}
+
+
+def test_a_save_into_a_folder_that_was_removed_fails_without_an_exception(tmp_path: Path) -> None:
+    folder = tmp_path / "state"
+    images = Kept(folder)
+    (folder / "cell.lock").unlink()
+    folder.rmdir()
+    assert not images.save("bar", IMAGE)
+    assert "No such file or directory" in images.warnings[0]
+    images.close()
+
+
+def test_a_folder_that_cannot_be_made_is_an_error_with_a_remedy(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(ImagesUnusable, match=r"cannot be kept in .*/file/state: Not a directory; .* --state DIR"):
+        Kept(tmp_path / "file" / "state")
+
+
+def test_one_process_at_a_time_has_the_images(tmp_path: Path) -> None:
+    images = Kept(tmp_path)
+    with pytest.raises(ImagesUnusable, match=r"/cell\.lock is locked: another process .* --state DIR"):
+        Kept(tmp_path)
+    images.close()
+    images.close()
+    Kept(tmp_path).close()
+
+
+def test_images_can_be_read_by_whoever_may_read_the_folder(images: Kept) -> None:
+    images.save("bar", IMAGE)
+    mask = os.umask(0)
+    os.umask(mask)
+    assert stat.S_IMODE(images.path("bar").stat().st_mode) == 0o666 & ~mask
+
+
+def test_names_of_files_are_safe_and_never_the_same(tmp_path: Path) -> None:
+    units = ["a", "a/b", "a_b", "a b", "../x", "A.b", "", "x" * 300, "x" * 301]
+    images = Images(tmp_path, "cell", dict.fromkeys(units, "gs-c200"))
+    paths = [images.path(unit) for unit in units]
+    assert len(set(paths)) == len(units)
+    for unit, path in zip(units, paths, strict=True):
+        assert path.parent == tmp_path
+        assert images.save(unit, unit.encode())
+    assert images.load().images == {unit: unit.encode() for unit in units}
+    images.close()
+
+
+def test_cell_files_of_one_name_in_two_folders_do_not_share_images(tmp_path: Path) -> None:
+    names = [cell_name(str(tmp_path / folder / "drilling.toml"), is_file=True) for folder in ("a", "b", "b/../a")]
+    assert names[0] != names[1]
+    assert names[0] == names[2]
+    assert all(name.startswith("drilling-") for name in names)
+    assert cell_name("gs-c200", is_file=False) == "gs-c200"
+
+
+def test_images_are_kept_where_the_system_keeps_state() -> None:
+    assert default_folder({"XDG_STATE_HOME": "/var/state"}) == Path("/var/state/detent")
+    assert default_folder({"XDG_STATE_HOME": "not/absolute"}) == Path.home() / ".local/state/detent"
+    assert default_folder({}) == Path.home() / ".local/state/detent"

@@ -1,0 +1,182 @@
+import select
+import tracemalloc
+from collections.abc import Sequence
+from fractions import Fraction
+
+import pytest
+from tests.realtime.ticking import LOOK, Client, TickingCell, Wall
+
+from detent.realtime.loop import LONGEST, Loop
+from detent.realtime.pace import Pace
+from detent.ticks import MS, SECOND, US
+
+DAY = 24 * 3600 * SECOND
+
+
+class Ready(Wall):
+    """A wall clock on which every wait ends at once, with `readable` to read."""
+
+    def __init__(self, *readable: int) -> None:
+        super().__init__()
+        self.readable = list(readable)
+        self.asked: list[float | None] = []
+
+    def wait(
+        self, readers: Sequence[int], writers: Sequence[int], _: Sequence[int], seconds: float | None
+    ) -> tuple[list[int], list[int], list[int]]:
+        self.asked.append(seconds)
+        return [descriptor for descriptor in self.readable if descriptor in readers], [], []
+
+
+@pytest.mark.parametrize("factor", [Fraction(1), Fraction(1, 3), Fraction(73, 10)])
+def test_in_a_day_no_deadline_is_missed_and_the_clock_does_not_drift(factor: Fraction) -> None:
+    wall, cell, client = Wall(), TickingCell(2 * SECOND), Client()
+    began = wall.now
+    pace = Pace(factor, clock=wall)
+    loop = Loop(cell, pace, [(0, client)], wait=wall.wait)
+    while cell.now < DAY:
+        loop.step()
+    loop.close()
+    assert cell.now == (wall.now - began) * factor.numerator // factor.denominator
+    assert cell.ticks == cell.now // (2 * SECOND) == client.heard == pace.lateness.count
+    assert pace.lateness.most <= 200 * US + LOOK
+
+
+def test_a_day_takes_no_memory() -> None:
+    wall, cell, client = Wall(), TickingCell(20 * SECOND), Client()
+    loop = Loop(cell, Pace(clock=wall), [(0, client)], wait=wall.wait)
+
+    def run_to(end: int) -> int:
+        while cell.now < end:
+            loop.step()
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        after_an_hour = run_to(DAY // 24)
+        assert run_to(DAY) - after_an_hour < 2_000
+    finally:
+        tracemalloc.stop()
+    loop.close()
+
+
+def test_what_a_client_sends_reaches_the_line_at_the_present_and_is_answered_in_the_same_step() -> None:
+    wall, cell, client = Ready(1000), TickingCell(None), Client()
+    loop = Loop(cell, Pace(3, clock=wall), [(0, client)], wait=wall.wait)
+    wall.now += 1_000
+    client.inbox.append(b"F\r")
+    loop.step()
+    loop.close()
+    assert cell.sent == [(3_000, 0, b"F\r")]
+    assert client.outbox == b"F\r"
+
+
+def test_a_deadline_comes_before_the_bytes_that_arrive_after_it() -> None:
+    wall, cell, client = Ready(1000), TickingCell(MS), Client()
+    loop = Loop(cell, Pace(clock=wall), [(0, client)], wait=wall.wait)
+    wall.now += MS + 1
+    client.inbox.append(b"x")
+    loop.step()
+    loop.close()
+    assert client.outbox == b"tx"
+
+
+def test_every_endpoint_of_a_line_hears_it_and_no_other_does() -> None:
+    wall, cell = Ready(1000), TickingCell(None, lines=2)
+    talking, beside, elsewhere = Client(1000), Client(1001), Client(1002)
+    loop = Loop(cell, Pace(clock=wall), [(1, talking), (1, beside), (0, elsewhere)], wait=wall.wait)
+    talking.inbox.append(b"V1\r")
+    loop.step()
+    loop.close()
+    assert (talking.outbox, beside.outbox, elsewhere.outbox) == (b"V1\r", b"V1\r", b"")
+
+
+def test_bytes_of_eight_bits_pass_as_they_are() -> None:
+    wall, cell, client = Ready(1000), TickingCell(None), Client()
+    loop = Loop(cell, Pace(clock=wall), [(0, client)], wait=wall.wait)
+    client.inbox.append(b"\x80\xff\x00")
+    loop.step()
+    loop.close()
+    assert cell.got() == client.outbox == b"\x80\xff\x00"
+
+
+def test_a_client_waits_while_its_line_is_too_far_behind() -> None:
+    wall, cell, client = Ready(), TickingCell(None), Client()
+    loop = Loop(cell, Pace(clock=wall), [(0, client)], patience=[100], wait=wall.wait)
+    for busy_until in (100, 101, 0):
+        cell.lines[0].host_busy_until = busy_until
+        loop.step()
+    loop.close()
+    assert client.rooms == [True, False, True]
+
+
+def test_a_loop_without_deadlines_sleeps_until_somebody_says_something() -> None:
+    wall, cell = Ready(), TickingCell(None)
+    loop = Loop(cell, Pace(clock=wall), [(0, Client())], wait=wall.wait)
+    loop.step()
+    loop.close()
+    assert wall.asked == [None]
+
+
+def test_the_sleep_ends_a_little_before_the_deadline_and_the_rest_is_watched() -> None:
+    wall, cell = Ready(), TickingCell(MS)
+    loop = Loop(cell, Pace(clock=wall), [(0, Client())], wait=wall.wait)
+    loop.step()
+    wall.now += MS - 1
+    loop.step()
+    loop.close()
+    assert wall.asked == [pytest.approx(940e-6, abs=1e-9), 0.0]
+    assert cell.ticks == 0
+
+
+class Slow(TickingCell):
+    """A cell that takes ten times as long as it lasts."""
+
+    def __init__(self, wall: Wall) -> None:
+        super().__init__(100 * US)
+        self.wall = wall
+
+    def run_to(self, until: int) -> None:
+        super().run_to(until)
+        self.wall.now += MS
+
+
+def test_a_cell_that_cannot_keep_pace_still_serves_its_clients_and_its_lateness_shows_it() -> None:
+    wall = Ready(1000)
+    cell, client = Slow(wall), Client()
+    pace = Pace(clock=wall)
+    loop = Loop(cell, pace, [(0, client)], wait=wall.wait)
+    wall.now += SECOND
+    client.inbox.append(b"x")
+    loop.step()
+    loop.close()
+    assert cell.got() == b"x"
+    assert cell.ticks == LONGEST // MS + 1, "it stopped soon after the time it may take"
+    assert cell.now == cell.ticks * 100 * US, "nothing was skipped"
+    assert pace.lateness.most > SECOND
+
+
+def test_an_endpoint_is_called_when_it_wants_to_be() -> None:
+    wall, cell, client = Wall(), TickingCell(None), Client()
+    loop = Loop(cell, Pace(clock=wall), [(0, client)], wait=wall.wait)
+    client.alarm = wall.now + SECOND
+    while not client.alarms:
+        loop.step()
+    loop.close()
+    assert client.alarms[0] - wall.now <= 0
+    assert SECOND <= client.alarms[0] - 123_456_789_012_345 <= SECOND + 200 * US + LOOK
+
+
+def test_stopping_wakes_a_sleeping_loop() -> None:
+    loop = Loop(TickingCell(None), Pace(), [], wait=select.select)
+    loop.stop()
+    loop.run()
+    loop.close()
+
+
+def test_stopping_again_and_again_does_no_harm() -> None:
+    loop = Loop(TickingCell(None), Pace(), [], wait=select.select)
+    for _ in range(100_000):  # more than the pipe that wakes it holds
+        loop.stop()
+    loop.run()
+    loop.close()
