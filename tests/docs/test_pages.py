@@ -1,4 +1,4 @@
-"""The pages are true: generated parts are up to date, links lead somewhere, proofs exist, keys are those of the code."""
+"""The pages are true: generated parts are up to date, links lead somewhere, proofs exist, keys are the code's."""
 
 import importlib.util
 import re

@@ -155,9 +155,9 @@ def advance(  # type: ignore[no-untyped-def]
             y = (xm - turns * PIO2_HIGH) - turns * PIO2_LOW
             y2 = y * y
             sine = y - y * y2 * (1 / 6 - y2 * (1 / 120 - y2 * (1 / 5040 - y2 * (1 / 362880 - y2 * (
-                1 / 39916800 - y2 * (1 / 6227020800 - y2 / 1307674368000))))))  # fmt: skip
+                1 / 39916800 - y2 * (1 / 6227020800 - y2 * (1 / 1307674368000)))))))  # fmt: skip
             cosine = 1.0 - y2 * (0.5 - y2 * (1 / 24 - y2 * (1 / 720 - y2 * (1 / 40320 - y2 * (
-                1 / 3628800 - y2 * (1 / 479001600 - y2 * (1 / 87178291200 - y2 / 20922789888000)))))))  # fmt: skip
+                1 / 3628800 - y2 * (1 / 479001600 - y2 * (1 / 87178291200 - y2 * (1 / 20922789888000))))))))  # fmt: skip
             pairs = float(floor(turns * 0.5))
             odd = turns - 2.0 * pairs
             half = pairs - 2.0 * float(floor(pairs * 0.5))

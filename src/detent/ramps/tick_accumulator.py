@@ -132,7 +132,7 @@ def toward(
     """
     phases = _Phases(phase, speed, steps)
     kept, wanted = keep * UPDATES, max(run * UPDATES, speed)
-    rises = falls = 0
+    rises = falls = -1
     if not braking:
         least = 2 * braking_slope
         enough = least * steps * UNIT + kept * kept  # it brakes once least * position + speed**2 has reached this

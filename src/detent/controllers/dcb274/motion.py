@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from detent.axis import Axis
 from detent.controllers.dcb274 import settings
-from detent.controllers.dcb274.pins import DIRECTION_HOLD, LEAST_STEP_LOW, LEAST_STEP_PERIOD
+from detent.controllers.dcb274.pins import LEAST_STEP_LOW, LEAST_STEP_PERIOD
 from detent.controllers.dcb274.ports import Ports
 from detent.controllers.dcb274.settings import Settings
 from detent.pins import HIGH, LOW, Level
@@ -37,7 +37,7 @@ _INDEXING = (Course.INDEX, Course.SEEK_LOW, Course.SEEK_HIGH)
 
 
 class News(NamedTuple):
-    """What a deadline brought: the motion has ended; a step has reached the trip position."""
+    """What a deadline or an input brought: an action may be complete; a step has reached the trip position."""
 
     ended: bool = False
     tripped: bool = False
@@ -346,15 +346,14 @@ class Motion:
         if self._encoder:
             # A leads B in plus direction: A equals B behind an edge of B, and differs behind one of A
             direction = 1 if (a != b) is (pin == "STEP") else -1
-        elif pin == "DIR" or level == LOW:
-            if pin == "STEP":
-                self._step_fell = now
-            elif now - self._stepped < DIRECTION_HOLD:
-                pass  # too early: the step has been made in the direction of its edge
+        elif pin == "DIR":
+            return NOTHING
+        elif level == LOW:
+            self._step_fell = now
+            return NOTHING
+        elif now - self._step_fell < LEAST_STEP_LOW:
             return NOTHING
         else:
-            if now - self._step_fell < LEAST_STEP_LOW:
-                return NOTHING
             direction = 1 if b == HIGH else -1
         if now - self._stepped < LEAST_STEP_PERIOD or not self.at_rest or self._ports.limit(direction):
             return NOTHING
@@ -362,5 +361,7 @@ class Motion:
         self._axis.every_pulse = False
         self._axis.start(Train((Uniform(-to_fixed(1), 1, 1, 1),), to_fixed(now)), direction, (), now)
         self._axis.advance(now)
+        if self._ports.pulses_are_wired:
+            self._ports.pulse(now)
         self.rested_at = now
         return News(False, self._trip is not None and self.position(now) == self._trip)

@@ -5,7 +5,7 @@ on pulls its pin to 0.
 """
 
 from detent.controllers.dcb274 import settings
-from detent.controllers.dcb274.pins import INPUTS, STEP_LOW
+from detent.controllers.dcb274.pins import DIRECTION_HOLD, INPUTS, STEP_LOW
 from detent.controllers.dcb274.settings import Settings
 from detent.pins import HIGH, LOW, Level, PinDriver
 from detent.ticks import NEVER, Ns
@@ -88,7 +88,7 @@ class Ports:
             self._direction = direction
             if self._settings.flags & settings.STEP_OUT:
                 # the slave needs its direction for 10 us behind the rising edge (page 10)
-                self._turns = max(now, self._last_pulse + STEP_LOW + 12_000)
+                self._turns = max(now, self._last_pulse + STEP_LOW + DIRECTION_HOLD)
         self.show(now)
 
     def pulse(self, now: Ns) -> None:

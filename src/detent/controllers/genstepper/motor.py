@@ -6,13 +6,15 @@ takes the accumulators as they are on the tick, and plans on from there. Ticks a
 
 from enum import Enum
 
-from detent.axis import Axis, Moment
+from detent.axis import Axis
+from detent.controllers.genstepper.inputs import Limits
 from detent.controllers.genstepper.link import LARGEST, saturated
-from detent.ramps.tick_accumulator import TICK, UPDATES, Plan, Point, slewing, stopping, toward
+from detent.pulses import Ticked, Train
+from detent.ramps.tick_accumulator import TICK, UNIT, UPDATES, Plan, Point, slewing, stopping, toward
 from detent.ticks import NEVER, Ns, to_fixed
 
 LEAST_KEPT, DEFAULT_SLOPE, DEFAULT_RATE = 80, 8_000, 400  # what K, P and R make of 0
-ONE_STEP = toward(1, 0, UPDATES * UPDATES, UPDATES, 1, UPDATES, 1)  # a train of one tick with a step on it
+ONE_STEP = Train((Ticked(0, TICK, 1, UNIT, 0, UNIT),))  # one tick, with a step on it
 
 
 class Action(Enum):
@@ -30,11 +32,12 @@ class Motor:
     """One motor. `deadline` says when to call `advance`, which is True when the motor has come to rest."""
 
     __slots__ = ("_axis", "_begin_tick", "_braking_slope", "_ends_at", "_go_keep", "_go_run", "_limit_tick", "_origin",
-                 "_plan", "_time_zero", "action", "deadline", "direction", "idle_windings", "keep", "mark", "mode",
-                 "rate", "slope", "target")  # fmt: skip
+                 "_limits", "_plan", "_time_zero", "action", "deadline", "direction", "idle_windings", "keep", "mark", "mode",
+                 "name", "rate", "slope", "target")  # fmt: skip
 
-    def __init__(self, axis: Axis) -> None:
-        self._axis = axis
+    def __init__(self, axis: Axis, limits: Limits) -> None:
+        self._axis, self._limits = axis, limits
+        self.name = axis.name
         self.reset(0, keep=LEAST_KEPT, slope=DEFAULT_SLOPE, rate=800, idle_windings=0)
 
     def reset(self, now: Ns, *, keep: int, slope: int, rate: int, idle_windings: int) -> None:
@@ -63,9 +66,9 @@ class Motor:
         return self.action is Action.IDLE
 
     @property
-    def in_steps(self) -> bool:
-        """Whether it is stepping, and not between a stop and what follows."""
-        return self.action is not Action.IDLE
+    def origin(self) -> int:
+        """The place of the shaft that is location 0."""
+        return self._origin
 
     def position(self, now: Ns) -> int:
         """The location, in microsteps."""
@@ -146,12 +149,15 @@ class Motor:
             self._axis.cut(now)
         self._rest()
 
-    def limit(self, hard: bool, now: Ns) -> None:
-        """The limit ahead has closed: stop, for good."""
-        self._limit_tick = self._tick(now)
-        if hard:
+    def look_at_limit(self, now: Ns) -> None:
+        """A limit may have closed: one ahead is latched, and stops what goes on towards it, softly or at once."""
+        if self.action is Action.IDLE or not self._limits.meets(self.name, self.direction):
+            return
+        if self._limits.hard:
+            self._limit_tick = self._tick(now)
             self.halt(now)
-        else:
+        elif self.action in (Action.GOING, Action.SLEWING):
+            self._limit_tick = self._tick(now)
             self.stop(now)
 
     def set_rate(self, rate: int, now: Ns) -> None:
@@ -179,7 +185,7 @@ class Motor:
         """One microstep at `now`, asked for by a pulse."""
         self.direction = direction
         if abs(self.position(now) + direction) <= LARGEST:
-            self._axis.start(ONE_STEP.train.at(to_fixed(now - TICK)), direction, (), now)
+            self._axis.start(ONE_STEP.at(to_fixed(now - TICK)), direction, (), now)
             self._axis.advance(now)
 
     # -- time --------------------------------------------------------------------------------------------
@@ -218,6 +224,8 @@ class Motor:
             return
         self._go_run, self._go_keep, self._braking_slope = self.rate, self.keep, self.slope
         self.direction = 1 if distance > 0 else -1
+        if self._barred(tick):
+            return
         speed = min(self._go_keep, self._go_run) * UPDATES
         plan = toward(abs(distance), 0, speed, self._go_run, self.slope, self._go_keep, self._braking_slope)
         self._follow(Action.GOING, plan, tick, now)
@@ -236,12 +244,22 @@ class Motor:
 
     def _start_slew(self, direction: int, tick: int, now: Ns) -> None:
         self.direction = direction
+        if self._barred(tick):
+            return
         room = self._room(direction, now)
         if room == 0:
             self._rest()
             return
         speed = min(self.keep, self.rate) * UPDATES
         self._follow(Action.SLEWING, slewing(0, speed, self.rate, self.slope, room), tick, now)
+
+    def _barred(self, tick: int) -> bool:
+        """Whether the limit ahead is active already: then there is no step, it is latched, the motor idle."""
+        if not self._limits.meets(self.name, self.direction):
+            return False
+        self._limit_tick = tick
+        self._rest()
+        return True
 
     def _continue_slew(self, now: Ns) -> None:
         point = self._point(now)
@@ -287,6 +305,3 @@ class Motor:
 
     def _await(self) -> None:
         self.deadline = min(self._axis.deadline, self._ends_at)
-
-
-__all__ = ["Action", "Moment", "Motor"]

@@ -1,0 +1,38 @@
+"""A line of a cell as a host driver's port: bytes written and read, and waiting, in the cell's virtual time."""
+
+from detent.cell.cell import Cell
+from detent.ticks import SECOND, Ns
+
+PATIENCE: Ns = 1 * SECOND  # how long `read` waits for an answer
+
+
+class HostPort:
+    """The host's end of line number `line` of `cell`. `wait` lets virtual time pass."""
+
+    def __init__(self, cell: Cell, line: int = 0, *, patience: Ns = PATIENCE) -> None:
+        self.cell, self.line, self.patience = cell, line, patience
+        self._heard = bytearray()
+
+    def write(self, data: bytes) -> int:
+        """Send `data` behind what is still being sent."""
+        self.cell.send(self.line, data)
+        return len(data)
+
+    def read(self, count: int) -> bytes:
+        """The next `count` bytes, or those that come while the patience lasts. Time passes until they are there."""
+        line = self.cell.lines[self.line]
+        until = max(self.cell.now, line.host_busy_until) + self.patience
+        while True:
+            self._heard += bytes(heard.char.value for heard in line.take())
+            at = self.cell.next_event()
+            if len(self._heard) >= count or at is None or at > until:
+                break
+            self.cell.step()
+        data = bytes(self._heard[:count])
+        del self._heard[:count]
+        return data
+
+    def wait(self, seconds: float) -> None:
+        """Let so many seconds pass, from the end of what is being sent."""
+        begin = max(self.cell.now, self.cell.lines[self.line].host_busy_until)
+        self.cell.run_to(begin + round(seconds * SECOND))

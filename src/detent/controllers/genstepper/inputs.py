@@ -1,0 +1,54 @@
+"""Limit switches, slew keys and the rate key: the TTL inputs outside E mode (manual, pages 19 to 21, 34)."""
+
+from collections.abc import Mapping
+
+from detent.controllers.genstepper.pins import LIMITS
+from detent.pins import HIGH, LOW, Level
+
+RESET_LATCH = 16
+STANDARD_RATES = (16, 40, 80, 160, 400, 800, 1600, 4000, 8000)  # page 21; NXT steps through them
+FIRST_RATE = 5  # its place after a reset, which is 800
+
+
+class Limits:
+    """The limit inputs, what T makes of them, and what L reports."""
+
+    __slots__ = ("_inputs", "_mask", "_off", "hard", "latches")
+
+    def __init__(self, inputs: Mapping[str, Level], hard: bool) -> None:
+        self._inputs = inputs  # the levels of all inputs
+        self.hard = hard  # they stop at once (order option)
+        self.reset()
+
+    def reset(self) -> None:
+        """All four enabled, active when low; the reset itself is latched."""
+        self._mask = 0
+        self._off = False
+        self.latches = RESET_LATCH
+
+    def choose(self, mask: int) -> None:
+        """T: bits 0-3 block, bits 4-7 make a limit active when high."""
+        self._mask = mask & 0xFF
+
+    def switch(self, off: bool) -> None:
+        """In E mode the inputs may have another meaning, or none."""
+        self._off = off
+
+    def meets(self, axis: str, direction: int) -> bool:
+        """Whether a step action of `axis` in `direction` runs into its limit, which is latched then."""
+        place = LIMITS.index(f"L{axis}{'+' if direction > 0 else '-'}")
+        blocked, inverted = self._mask >> place & 1, self._mask >> place + 4 & 1
+        if self._off or blocked or self._inputs[LIMITS[place]] != (HIGH if inverted else LOW):
+            return False
+        self.latches |= 1 << place
+        return True
+
+    def report(self) -> int:
+        """L: what was latched; it is forgotten then."""
+        latched, self.latches = self.latches, 0
+        return latched
+
+
+def key(inputs: Mapping[str, Level], axis: str) -> int:
+    """The direction that the slew keys of an axis ask for; 0 for none, or both."""
+    return (inputs[f"{axis}+"] == LOW) - (inputs[f"{axis}-"] == LOW)
