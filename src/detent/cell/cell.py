@@ -122,7 +122,10 @@ class Cell:
         return at
 
     def _next(self) -> Ns:
-        return min(min(self._deadlines), self._line_deadline, self._script_deadline)
+        at = min(self._deadlines)
+        if self._line_deadline < at:
+            at = self._line_deadline
+        return self._script_deadline if self._script_deadline < at else at
 
     def _advance(self, at: Ns) -> None:
         """One instant: the parts' own deadlines, then pins and power, then characters."""
@@ -144,6 +147,8 @@ class Cell:
         self._note(Send(line, data))
         self.lines[line].send(data, self.now)
         self._plan_lines()
+        if self._line_deadline <= self.now:
+            self._hear(self.now)
         self._catch_up()
 
     def type(self, unit: str, text: str) -> None:
@@ -251,8 +256,10 @@ class Cell:
             elif kind is Sent:
                 place = self.wiring.speaks[index].get(item.port)  # type: ignore[union-attr]
                 if place is not None:
-                    self.lines[place[0]].from_unit(place[1], item)  # type: ignore[arg-type]
-                    self._plan_lines()
+                    line = self.lines[place[0]]
+                    line.from_unit(place[1], item)  # type: ignore[arg-type]
+                    if line.deadline < self._line_deadline:
+                        self._line_deadline = line.deadline
             elif kind in _MOTION:
                 for follower in self.wiring.followers[index]:
                     self.parts[follower].follow(item)  # type: ignore[attr-defined]
@@ -293,7 +300,11 @@ class Cell:
             self.journal.append(Action(self.now, deed))
 
     def _plan_lines(self) -> None:
-        self._line_deadline = min((line.deadline for line in self.lines), default=NEVER)
+        earliest = NEVER
+        for line in self.lines:
+            if line.deadline < earliest:
+                earliest = line.deadline
+        self._line_deadline = earliest
 
     def _hear(self, at: Ns) -> None:
         """Characters whose stop bits end now reach the units of their lines."""

@@ -9,6 +9,9 @@ from typing import Any, NamedTuple, Protocol
 
 from detent.assembler import Language
 from detent.controllers.device import CommandHelp, Controller
+from detent.controllers.genstepper import commands as genstepper_commands
+from detent.controllers.genstepper import pins as genstepper_pins
+from detent.controllers.genstepper.firmware import GenStepper
 from detent.controllers.gsc200 import commands as gsc200_commands
 from detent.controllers.gsc200 import pins as gsc200_pins
 from detent.controllers.gsc200 import program as gsc200_program
@@ -219,6 +222,52 @@ def _gsc200(name: str, options: tuple[Option, ...]) -> Model:
     )
 
 
+def _within(low: int, high: int) -> Callable[[str], int]:
+    def read(text: str) -> int:
+        number = int(text)
+        if not low <= number <= high:
+            raise ValueError(text)
+        return number
+
+    return read
+
+
+_YES_NO = _choice(no=False, yes=True, false=False, true=True)
+_RATE = _within(1, 62_500)
+_GENSTEPPER_OPTIONS = (
+    Option("step_size", "step_size", _within(1, 64), "1 to 64", "4", "microstep after power-on, in 1/64 of a full step"),
+    Option("stop_rate", "stop_rate", _RATE, "1 to 62500", "80", "stop OK rate (K) after a reset, microsteps/s"),
+    Option("ramp", "ramp", _RATE, "1 to 62500", "8000", "ramp rate (P) after a reset, microsteps/s/s"),
+    Option("run_rate", "run_rate", _RATE, "1 to 62500", "800", "run rate (R) after a reset, microsteps/s"),
+    Option("auto_rate", "auto_rate", _within(0, 62_500), "0 to 62500", "3072", "auto full step rate (A) after a reset"),
+    Option("auto_mode", "auto_mode", _within(0, 3), "0 to 3, as O", "2", "step mode above the auto full step rate"),
+    Option("high_power", "high_power", _within(0, 1), "0 (full) or 1 (half)", "0", "H without the half power jumper"),
+    Option("low_power", "low_power", _within(0, 1), "0 (full) or 1 (half)", "1", "H with the half power jumper"),
+    Option("idle_windings", "idle_windings", _within(0, 2), "0 to 2, as W", "0", "windings when idle after a reset"),
+    Option("hard_stop", "hard_stop", _YES_NO, "yes or no", "no", "limit switches stop at once"),
+    Option("e_mode", "e_mode", _within(0, 255), "0 to 255, as E", "0", "direct pulse control after a reset"),
+    Option("double_current", "double_current", _YES_NO, "yes or no", "no", "one motor on both connectors, without R1K"),
+    Option("slew_inputs", "slew_inputs", _YES_NO, "yes or no (NOSLEW)", "yes", "the slew inputs slew"),
+    Option("dual_baud", "dual_baud", _YES_NO, "yes or no (DUALBAUD)", "no", "the half power jumper quarters the baud rate"),
+    Option("baud", "baud", _choice(**{"2400": 2400, "4800": 4800, "9600": 9600}), "2400, 4800 or 9600", "9600", "rate of the line"),
+)  # fmt: skip
+
+
+def _genstepper(name: str, port: str) -> Model:
+    return Model(
+        name,
+        f"Peter Norberg Consulting {name.upper()}, two motors, {port}, GenStepper 2.18",
+        "docs/controllers/genstepper.md",
+        genstepper_pins.PINS[name],
+        genstepper_pins.DEFAULT_STRAPS[name],
+        _GENSTEPPER_OPTIONS,
+        lambda straps, **keywords: GenStepper(name, straps, **keywords),
+        None,
+        lambda: genstepper_commands.reference(name),
+        lambda units: genstepper_pins.strap_line(name, units),
+    )
+
+
 MODELS: dict[str, Model] = {
     "gs-c200": _gsc200("gs-c200", (*_GSC200_OPTIONS, _GSC200_REVISION)),
     "gs-c200s": _gsc200("gs-c200s", _GSC200_OPTIONS),
@@ -237,4 +286,6 @@ MODELS: dict[str, Model] = {
         told_apart_by="number",
         answered=supersigma_link.answered,
     ),
+    "bs0610": _genstepper("bs0610", "RS-232"),
+    "bs0710": _genstepper("bs0710", "USB"),
 }

@@ -57,9 +57,30 @@ class Powered(NamedTuple):
     on: bool
 
 
+class Drive(Protocol):
+    """How windings are driven, as a function of nothing but the position and the rate."""
+
+    def duties(self, position: int, rate: int) -> Sequence[int]:
+        """PWM counts of the winding ends, at a position in microsteps and a rate in microsteps/s."""
+
+
+class DriveSet(NamedTuple):
+    """The windings at `connector` are driven by `drive`, until it is set again.
+
+    The position is that of the shaft of `axis` less `origin`, the rate is its train's: no step needs an event.
+    """
+
+    at: Ns
+    connector: str
+    axis: str
+    origin: int
+    drive: Drive
+
+
 Output: TypeAlias = (
-    Sent | PinSet | MotionStarted | MotionCut | MotionEnded | Executing | Finished | Refused | StoreImage | Powered
-)
+    Sent | PinSet | MotionStarted | MotionCut | MotionEnded | DriveSet
+    | Executing | Finished | Refused | StoreImage | Powered
+)  # fmt: skip
 
 
 class CommandHelp(NamedTuple):

@@ -70,6 +70,9 @@ class Line:
     def from_unit(self, place: int, sent: Sent) -> None:
         """The unit at `place` on the line begins a character."""
         began, done, char = sent.at, sent.done, sent.char
+        if began == done:  # characters take no time here, so that none can meet another
+            self.heard.append(Heard(done, char))
+            return
         for index, other in enumerate(self._from_units):
             if (other.began, other.done) == (began, done) and began < done:
                 merged = Char(other.char.value & char.value, other.char.parity_ok, other.char.framing_ok)
@@ -84,10 +87,9 @@ class Line:
     def advance(self, now: Ns) -> list[Arrival]:
         """Deliver what is due: to the host into `heard`; returned is what reaches the units at `now`."""
         self._host.advance(now)
-        due = [talking for talking in self._from_units if talking.done <= now]
-        if due:
+        if self._from_units:
+            self.heard += [Heard(talking.done, talking.char) for talking in self._from_units if talking.done <= now]
             self._from_units = [talking for talking in self._from_units if talking.done > now]
-            self.heard += [Heard(talking.done, talking.char) for talking in due]
         arrived = [sent for sent in self._on_wire if sent.done - self._early <= now]
         if arrived:
             del self._on_wire[: len(arrived)]

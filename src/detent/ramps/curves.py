@@ -6,10 +6,12 @@ from itertools import pairwise
 
 from detent.ramps.differences import Curve, CurveError
 
-PEAK, ANGULAR, PHASE, DURATION = 15_000.0, 4.54426, 0.2097, 0.3
+PAPER_SINE = (15_000.0, 4.54426, 0.2097)  # peak, angular speed, phase
+PAPER_DURATION = 0.3
+PAPER_LOW, PAPER_HIGH = 650.0, 15_000.0
 
 
-def sine_squared(peak: float = PEAK, angular: float = ANGULAR, phase: float = PHASE) -> Curve:
+def sine_squared(peak: float, angular: float, phase: float) -> Curve:
     """V = peak sin^2(angular t + phase), the paper's law (equation 3).
 
     The paper prints a peak of 14 000, which gives neither of its own end points; 15 000 gives both: 650 at 0 s and

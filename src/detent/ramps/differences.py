@@ -97,7 +97,7 @@ def compiled(curve: Curve, duration: float, interval: int = INTERVAL) -> Differe
     """The table of `curve` from t = 0 to `duration` seconds. Raises CurveError with the place of the first fault."""
     times = list(instants(duration, interval))
     if len(times) < 2:
-        raise CurveError(f"the curve lasts {duration:g} s and the interval is {times_of(interval)}: "
+        raise CurveError(f"the curve lasts {duration:g} s and the interval is {shown_interval(interval)}: "
                          "there is no difference; make the curve longer or the interval shorter")  # fmt: skip
     counts = [_count(curve(t), t) for t in times]
     for i, (before, after) in enumerate(pairwise(counts)):
@@ -110,7 +110,7 @@ def compiled(curve: Curve, duration: float, interval: int = INTERVAL) -> Differe
     return Differences(counts[0], differences, interval)
 
 
-def times_of(interval: int) -> str:
+def shown_interval(interval: int) -> str:
     """An interval in clocks as people read it."""
     return f"{interval * CLOCK_NS / 1e6:g} ms"
 

@@ -134,7 +134,7 @@ class Generator:
         if event.kind == "ENABLE":
             self.enabled = event.level == 1
             if self.enabled and self.held and not self.over:
-                self.give(Decimal(event.at+1))
+                self.give(Decimal(event.at))
         elif self.over:
             return
         elif event.kind == "K":

@@ -115,7 +115,7 @@ def event_lists(draw: st.DrawFn, move: Move) -> list[Event]:
     return [Event(max(at, SECOND), kind, level) for at, (kind, level) in sorted(chosen, key=lambda item: item[0])]
 
 
-@settings(max_examples=150, **SETTINGS)
+@settings(max_examples=400, **SETTINGS)
 @given(data=st.data(), direction=st.sampled_from([1, -1]), enabled=st.sampled_from([True, True, True, False]))
 def test_every_pulse_comes_when_the_specification_says(data: st.DataObject, direction: int, enabled: bool) -> None:
     move = data.draw(moves())

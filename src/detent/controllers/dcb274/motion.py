@@ -133,6 +133,10 @@ class Motion:
         self._trip = position
         self._remark(now)
 
+    def reset_phase(self, now: Ns) -> None:
+        """H: back to step 1 of the sequence (page 40)."""
+        self.phase_origin = self._axis.shaft_at(now)
+
     # -- starting ----------------------------------------------------------------------------------------
 
     def index(self, steps: int, direction: int, now: Ns) -> None:
@@ -270,6 +274,7 @@ class Motion:
     def _start(self, train: Train, direction: int, now: Ns) -> None:
         start = to_fixed(now + self._pre_energize(now))
         self._stopping = False
+        self.step_period = NEVER
         self._ports.moving(True, direction, now)
         self._axis.every_pulse = self._ports.pulses_are_wired
         self._axis.start(train.at(start), direction, (), now)

@@ -63,7 +63,7 @@ class GenStepper:
         order = self._order
         self._value = link.Value()
         self._prompter = Prompter(pins.SERIAL_PORT.sends, self.line_format, self._out, timed=self._line_timing)
-        self._selected = AXES
+        self._selected: tuple[str, ...] = AXES
         self._waiting: tuple[str, ...] = ()  # motors that an I waits for
         self._verbose = link.CRLF_FIRST
         self._limits.reset()
@@ -88,8 +88,8 @@ class GenStepper:
         self.advance(now)
         if on == (self._phase is not Phase.OFF):
             return
-        self._out.append(Powered(now, on))
         if on:
+            self._out.append(Powered(now, on))
             for pin in self.pins:
                 if pin.kind.drives:
                     self._driver.set(pin.name, pin.rest, now)
@@ -97,6 +97,7 @@ class GenStepper:
         else:
             self._phase = Phase.OFF
             self._clear(now, self._order.step_size)
+            self._out.append(Powered(now, on))
             self._driver.release()
 
     def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
@@ -226,6 +227,11 @@ class GenStepper:
 
     def start(self, now: Ns) -> None:
         """It holds no program."""
+
+    def _next(self) -> Ns:
+        motors = self._motors
+        return min(motors["X"].deadline, motors["Y"].deadline, self._direct.deadline, self._wakes,
+                   self._prompter.deadline)  # fmt: skip
 
     # -- resets ------------------------------------------------------------------------------------------
 
@@ -412,19 +418,19 @@ class GenStepper:
         return None
 
     def _keep(self, now: Ns) -> Sequence[str]:
-        rate = _rate(self._value.number(), LEAST_KEPT)
+        rate = _limited(self._value.number(), LEAST_KEPT)
         for motor in self._each():
             motor.keep = rate
         return ()
 
     def _slope(self, now: Ns) -> Sequence[str]:
-        slope = _rate(self._value.number(), DEFAULT_SLOPE)
+        slope = _limited(self._value.number(), DEFAULT_SLOPE)
         for motor in self._each():
             motor.set_slope(slope, now)
         return ()
 
     def _rate(self, now: Ns) -> Sequence[str]:
-        rate = _rate(self._value.number(), DEFAULT_RATE)
+        rate = _limited(self._value.number(), DEFAULT_RATE)
         for motor in self._each():
             motor.set_rate(rate, now)
         return ()
@@ -542,7 +548,7 @@ class GenStepper:
     }  # fmt: skip
 
 
-def _rate(number: int, default: int) -> int:
+def _limited(number: int, default: int) -> int:
     """A rate or slope as K, P and R take it: `default` for 0, no more than the ticks allow; a sign does not count."""
     return min(abs(number), UPDATES) or default
 

@@ -12,6 +12,7 @@ command that the model does not have, 2 for an argument that is missing, not wan
 
 from collections.abc import Iterator
 from enum import Enum
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 from detent.controllers.device import CommandHelp
@@ -340,6 +341,7 @@ def takes(model: str, spelling: str) -> str:
     return f"{spelling} takes " + "; or ".join(row.argument.words for row in spelled(model, spelling))
 
 
+@lru_cache(maxsize=1024)  # hosts say the same few things again and again
 def parse(model: str, text: str) -> Instruction:
     """The instruction in a command as it comes on the wire, without address, checksum and CR.
 

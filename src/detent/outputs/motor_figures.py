@@ -1,0 +1,104 @@
+"""Figures of a motor: torque against speed, and one move with rotor, load angle and currents.
+
+Need matplotlib, which is imported when a figure is made.
+"""
+
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from detent.motors.curve import PullOut
+from detent.motors.move import Run
+from detent.motors.named import Measured
+from detent.motors.rotor import Rig
+from detent.outputs.figures import COLOURS, DPI, GREY, PALE, check, style
+from detent.outputs.files import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COMMAND, ROTOR, PHASE_A, PHASE_B, LOST = GREY, COLOURS[0], COLOURS[2], COLOURS[1], "#C0392B"
+
+
+def write_curve(path: Path, rig: Rig, points: Sequence[PullOut], measured: Measured | None = None) -> None:
+    """Draw a torque curve, and the maker's points where there are some. ValueError, ImportError, OSError."""
+    with style():
+        figure = _figure(9.0, 5.6)
+        axes = figure.add_axes((0.09, 0.13, 0.87, 0.72))
+        per_step = rig.drive.winding.steps
+        rates = [point.rate * per_step for point in points]
+        axes.plot(rates, [point.torque for point in points], color=ROTOR, label="computed pull-out torque")
+        if measured is not None and measured.winding == rig.drive.winding.name:
+            axes.plot(*zip(*measured.points, strict=True), "o", color=PHASE_B, markersize=5,
+                      label=f"published: {measured.supply:g} V, {measured.current:g} A")  # fmt: skip
+        axes.axhline(rig.motor.holding_torque, color=PALE, linestyle="--", linewidth=0.9)
+        axes.set_ylim(bottom=0)
+        axes.set_xlim(left=0)
+        _dress(axes, f"{rig.drive.winding.name} steps/s", "torque (Nm)")
+        axes.legend(frameon=False, loc="upper right")
+        drive = rig.drive
+        fit = f", inductance x{rig.motor.inductance_factor:.2f}" if rig.motor.inductance_factor != 1 else ""
+        _head(figure, f"{rig.motor.name}: torque against speed",
+              f"{drive.supply:g} V  ·  {drive.current:g} A  ·  {drive.winding.name} step  ·  {drive.decay} decay{fit}")  # fmt: skip
+        _save(figure, path)
+
+
+def write_move(path: Path, run: Run, title: str) -> None:
+    """Draw a move that was simulated with a trace. ValueError, ImportError, OSError."""
+    with style():
+        figure = _figure(12.0, 8.4)
+        boxes = [(0.075, bottom, 0.9, height) for bottom, height in ((0.62, 0.27), (0.36, 0.2), (0.08, 0.22))]
+        position, angle, current = (figure.add_axes(box) for box in boxes)
+        times = run.times * 1e3
+        position.step(times, run.command, where="post", color=COMMAND, linewidth=0.9, label="command")
+        position.plot(times, run.rotor, color=ROTOR, label="rotor")
+        position.legend(frameon=False, loc="upper left")
+        _dress(position, "", "position (full steps)")
+        angle.plot(times, run.load_angles, color=ROTOR, linewidth=0.9)
+        for limit in (-360, 360):
+            angle.axhline(limit, color=LOST, linewidth=0.8, linestyle="--")
+        worst = int(np.argmax(np.abs(run.load_angles)))
+        angle.plot(times[worst], run.load_angles[worst], "o", color=LOST, markersize=5)
+        most = max(400.0, 1.1 * float(np.abs(run.load_angles).max()))
+        angle.set_ylim(-min(most, 1500), min(most, 1500))
+        _dress(angle, "", "load angle (el. degrees)")
+        current.plot(times, run.trace[:, 3], color=PHASE_A, linewidth=0.8, label="phase A")
+        current.plot(times, run.trace[:, 4], color=PHASE_B, linewidth=0.8, label="phase B")
+        current.legend(frameon=False, loc="upper right")
+        _dress(current, "time (ms)", "current (A)")
+        for axes in (position, angle, current):
+            axes.set_xlim(times[0], times[-1])
+        _head(figure, f"{run.rig.motor.name}: {title}", str(run.verdict))
+        _save(figure, path)
+
+
+def _figure(width: float, height: float) -> "Figure":
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=DPI)
+
+
+def _head(figure: "Figure", title: str, about: str) -> None:
+    height = figure.get_figheight()
+    figure.text(0.03, 1 - 0.36 / height, title, fontsize=14, fontweight="bold")
+    figure.text(0.03, 1 - 0.62 / height, about, fontsize=10, color=GREY)
+
+
+def _dress(axes: "Axes", x: str, y: str) -> None:
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.grid(True)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _save(figure: "Figure", path: Path) -> None:
+    check(path)
+    data = BytesIO()
+    kind = path.suffix.lower()[1:]
+    stamps: dict[str, Any] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    figure.savefig(data, format=kind, metadata=stamps[kind])
+    write_whole(path, data.getvalue())
