@@ -19,6 +19,10 @@ class Char(NamedTuple):
     framing_ok: bool = True
 
 
+SOUND = tuple(Char(value) for value in range(256))
+"""Every undamaged character, made once."""
+
+
 class Format(NamedTuple):
     """One start bit, then `data_bits`, `parity` ('none', 'odd', 'even'), `stop_bits`, at `baud` bits a second."""
 
@@ -92,7 +96,7 @@ class Transmitter:
             return
         if not self._timed:
             for value in data:
-                self._out.append(Sent(now, self._port, Char(value), now))
+                self._out.append(Sent(now, self._port, SOUND[value], now))
             self.busy_until = now
             return
         if not self._queue:
@@ -121,5 +125,5 @@ class Transmitter:
             start = self.deadline
             self._index += 1
             done = self._burst + self._format.duration(self._index)
-            self._out.append(Sent(start, self._port, Char(self._queue.popleft()), done))
+            self._out.append(Sent(start, self._port, SOUND[self._queue.popleft()], done))
             self.deadline = done if self._queue else NEVER

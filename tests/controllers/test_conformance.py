@@ -9,8 +9,9 @@ from detent.cell.switches import Switch
 from tests.controllers import conformance
 from tests.controllers.conformance import Candidate, schedules
 from tests.controllers.gsc200 import inputs
+from tests.controllers.supersigma import inputs as supersigma
 
-CANDIDATES = (*inputs.CANDIDATES, Candidate("step detector", StepDetector, None, ["CLOCK"]),
+CANDIDATES = (*inputs.CANDIDATES, *supersigma.CANDIDATES, Candidate("step detector", StepDetector, None, ["CLOCK"]),
               Candidate("switch", lambda: Switch(1), None, ["SET"]))  # fmt: skip
 
 FAST = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))

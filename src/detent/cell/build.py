@@ -78,7 +78,7 @@ class _Builder:
                     [self.line(units, line_timing) for units in lines.values()],
                     [*actions, *journal], store=store, record=record)  # fmt: skip
         self.switch_on(cell, images)
-        cell.journaling = True
+        cell.journaling = record
         return cell
 
     # -- units -------------------------------------------------------------------------------------------

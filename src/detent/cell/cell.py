@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.deeds import Action, Deed, Power, Send, SetPin, SetSwitch, Start
+from detent.cell.deeds import Action, Power, Send, SetPin, SetSwitch, Start
 from detent.cell.recording import InputSet, Log, Received, Recording
 from detent.controllers.device import Controller, Device, Output, Powered, StoreImage
 from detent.lines.line import EVERYBODY, Line
@@ -144,7 +144,8 @@ class Cell:
 
     def send(self, line: int, data: bytes) -> None:
         """The host of a line sends `data`, now."""
-        self._note(Send(line, data))
+        if self.journaling and not self._acting:
+            self.journal.append(Action(self.now, Send(line, data)))
         self.lines[line].send(data, self.now)
         self._plan_lines()
         if self._line_deadline <= self.now:
@@ -161,13 +162,15 @@ class Cell:
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:
         """Drive an input pin from outside, now: a hand with a wire. Other drivers of its net are not asked."""
-        self._note(SetPin(unit, pin, level))
+        if self.journaling and not self._acting:
+            self.journal.append(Action(self.now, SetPin(unit, pin, level)))
         self._set_pin(self.unit(unit), pin, level)
         self._settle()
 
     def set_switch(self, name: str, level: Level) -> None:
         """Put a switch of the cell to `level`, now."""
-        self._note(SetSwitch(name, level))
+        if self.journaling and not self._acting:
+            self.journal.append(Action(self.now, SetSwitch(name, level)))
         index = self.wiring.names.index(name, self.wiring.units)
         self.parts[index].set_pin("SET", level, self.now)
         self._touched.add(index)
@@ -175,7 +178,8 @@ class Cell:
 
     def power(self, unit: str, on: bool) -> None:
         """Switch the supply of a unit, now."""
-        self._note(Power(unit, on))
+        if self.journaling and not self._acting:
+            self.journal.append(Action(self.now, Power(unit, on)))
         index = self.unit(unit)
         self.parts[index].power(on, self.now)
         self._touched.add(index)
@@ -189,7 +193,8 @@ class Cell:
 
     def start(self, unit: str) -> None:
         """Start the program in the unit's memory, now."""
-        self._note(Start(unit))
+        if self.journaling and not self._acting:
+            self.journal.append(Action(self.now, Start(unit)))
         self.controller(unit).start(self.now)
         self._touched.add(self.unit(unit))
         self._settle()
@@ -294,10 +299,6 @@ class Cell:
             self.recording.extend(index, (InputSet(self.now, pin, level),))
         self.parts[index].set_pin(pin, level, self.now)
         self._touched.add(index)
-
-    def _note(self, deed: Deed) -> None:
-        if self.journaling and self.recording is not None and not self._acting:
-            self.journal.append(Action(self.now, deed))
 
     def _plan_lines(self) -> None:
         earliest = NEVER

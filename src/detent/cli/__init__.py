@@ -14,6 +14,7 @@ VERBS = {
     "asm": ("detent.cli.assemble:asm", "Assemble a program: labels and comments in, commands or an image out."),
     "list": ("detent.cli.assemble:list_", "List a program source with the address and bytes of every instruction."),
     "disasm": ("detent.cli.assemble:disasm", "Turn a program image back into source, with labels for its jumps."),
+    "motor": ("detent.cli.motor:motor", "Say what a motor makes of its pulses: torque against speed, or a move judged."),
     "table": ("detent.cli.table:table", "Compile a curve into the table of differences of a SUPERSIGMA drive."),
 }
 """Each verb's function, and its first line of help, which `detent --help` shows without importing the function."""

@@ -154,11 +154,11 @@ def _list(json: bool) -> None:
         ]  # fmt: skip
         print(json_text.dumps({"motors": rows}))
         return
-    table = _table("motor", "", "A", "ohm", "mH", "Nm", "g cm2", "source")
+    table = _table("motor", "", "A", "ohm", "mH", "Nm", "g cm2", "maker")
     for motor in MOTORS.values():
         inertia = "-" if motor.inertia is None else f"{motor.inertia * 1e7:g}"
         values = (motor.current, motor.resistance, motor.inductance * 1e3, motor.holding_torque)
-        table.add_row(motor.name, motor.title, *(f"{value:g}" for value in values), inertia, motor.source)
+        table.add_row(motor.name, motor.title.split(",")[0], *(f"{value:g}" for value in values), inertia, motor.source.split()[0].split("-")[0])
     _print(table)
     print("\ndetent motor NAME  shows torque against speed;  detent motor NAME --move 1000 --slew 2000  judges a move.")
 
@@ -180,6 +180,7 @@ def _curve(rig: "Rig", facts: dict[str, Any], pull_in: bool, plot: Path | None, 
     if pull_in:
         found = pull_in_rate(rig.motor, rig.drive, rig.load)
         facts["pull_in"] = found.pull_in * per_step
+        facts["holes"] = [[low * per_step, high * per_step] for low, high in found.holes]
         facts["highest_start"] = found.highest * per_step
     if plot is not None:
         from detent.outputs import motor_figures
@@ -196,8 +197,10 @@ def _curve(rig: "Rig", facts: dict[str, Any], pull_in: bool, plot: Path | None, 
                       f"{point.torque * turns * 6.283185307:.1f}", f"{point.angle:.0f}\N{DEGREE SIGN}")  # fmt: skip
     _print(table)
     if pull_in:
-        print(f"\nStarts without a ramp into every speed up to {facts['pull_in']:.0f} steps/s"
-              f" (the highest at all: {facts['highest_start']:.0f}); the rule of thumb takes half of it.")  # fmt: skip
+        print(f"\nStarts without a ramp into up to {facts['highest_start']:.0f} steps/s; the rule of thumb takes half of it.")
+        if facts["holes"]:
+            bands = ", ".join(f"{low:.0f}-{high:.0f}" for low, high in facts["holes"])
+            print(f"Resonance loses steps at {bands} steps/s: friction damps it, and so does a finer step.")
     if plot is not None:
         print(f"Wrote {plot}")
 
@@ -309,7 +312,7 @@ def _table(*columns: str) -> Any:
 
     table = Table(box=None, pad_edge=False, header_style="dim")
     for column in columns:
-        table.add_column(column, justify="left" if column in ("motor", "", "source", "margin with") else "right")
+        table.add_column(column, no_wrap=True, justify="left" if column in ("motor", "", "maker", "margin with") else "right")
     return table
 
 

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 if TYPE_CHECKING:
     from detent.cell.cell import Cell
     from detent.cli.target import Target
+    from detent.controllers.device import Controller
     from detent.ticks import Ns
 
 MOST_INSTANTS = 500_000  # eventful instants without --for, after which a cell counts as endless
@@ -133,17 +134,26 @@ def _exchange(cell: "Cell", unit: str, text: str) -> Exchange:
     from detent.controllers.catalogue import model
     from detent.ticks import NEVER
 
-    line = cell.lines[cell.wiring.line_of[cell.unit(unit)]]
+    line, controller = cell.lines[cell.wiring.line_of[cell.unit(unit)]], cell.controller(unit)
+
+    def heard() -> list[str]:
+        return controller.answers(bytes(h.char.value for h in line.heard))
+
+    while controller.status(cell.now).state == "starting" and cell.step() is not None:
+        pass  # a board that is deaf after its reset
+    while line.deadline < NEVER and cell.step() is not None:
+        pass
     line.take()
     cell.type(unit, text)
-    answered = model(cell.controller(unit).model).answered(text)
+    answered = model(controller.model).answered(text)
     for _ in range(MOST_INSTANTS):
-        if (line.heard or not answered) and line.deadline >= NEVER:
+        if line.deadline >= NEVER and (not answered or heard()):
             break
         if cell.step() is None:
             break
-    heard = bytes(h.char.value for h in line.take())
-    return Exchange(unit, text, cell.controller(unit).answers(heard))
+    answers = heard()
+    line.take()
+    return Exchange(unit, text, answers)
 
 
 def _run_on(cell: "Cell", until: "Ns | None") -> str:
@@ -187,11 +197,20 @@ def _write(
 
 def result(cell: "Cell", ended: str, exchanges: list[Exchange]) -> dict[str, object]:
     """Where everything ended, as --json prints it."""
-    units = {name: unit.status(cell.now)._asdict() for name, unit in cell.controllers().items()}
+    units = {name: _where(unit, cell.now) for name, unit in cell.controllers().items()}
     result: dict[str, object] = {"time_ns": cell.now, "ended": ended, "units": units}
     if exchanges:
         result["exchanges"] = [exchange._asdict() for exchange in exchanges]
     return result
+
+
+def _where(unit: "Controller", now: "Ns") -> dict[str, object]:
+    """Where a unit is; one with several axes names the place of each."""
+    where: dict[str, object] = unit.status(now)._asdict()
+    if len(unit.axes) > 1:
+        places = {axis: unit.status(now, axis) for axis in unit.axes}
+        where["axes"] = {axis: {"position": at.position, "pulses": at.pulses} for axis, at in places.items()}
+    return where
 
 
 def print_result(cell: "Cell", ended: str, exchanges: list[Exchange], written: list[Path]) -> None:
@@ -212,10 +231,12 @@ def print_result(cell: "Cell", ended: str, exchanges: list[Exchange], written: l
         table.add_column(column, justify="right" if column in ("position", "pulses") else "left")
     moving = []
     for name, unit in cell.controllers().items():
-        status = unit.status(cell.now)
-        table.add_row(name, unit.model, str(status.position), str(status.pulses), status.state)
-        if status.state in ("running", "homing"):
-            moving.append(name)
+        for axis in unit.axes:
+            status = unit.status(cell.now, axis)
+            shown = f"{name}.{axis}" if axis else name
+            table.add_row(shown, unit.model, str(status.position), str(status.pulses), status.state)
+            if status.state in ("running", "homing"):
+                moving.append(shown)
     console.print(table)
     time = show_duration(cell.now)
     match ended:

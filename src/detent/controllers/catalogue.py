@@ -8,6 +8,11 @@ from difflib import get_close_matches
 from typing import Any, NamedTuple, Protocol
 
 from detent.assembler import Language
+from detent.controllers.dcb274 import commands as dcb274_commands
+from detent.controllers.dcb274 import link as dcb274_link
+from detent.controllers.dcb274 import pins as dcb274_pins
+from detent.controllers.dcb274 import program as dcb274_program
+from detent.controllers.dcb274.firmware import Dcb274
 from detent.controllers.device import CommandHelp, Controller
 from detent.controllers.genstepper import commands as genstepper_commands
 from detent.controllers.genstepper import pins as genstepper_pins
@@ -268,6 +273,36 @@ def _genstepper(name: str, port: str) -> Model:
     )
 
 
+def _axis_name(text: str) -> str:
+    if len(text) != 1 or not dcb274_link.is_name(ord(text)):
+        raise ValueError(text)
+    return text
+
+
+_DCB274_OPTIONS = (
+    Option(
+        "name", "name", _axis_name, "one character; not SPACE [ \\ ] ^ _ ` or @", "A",
+        "name of the axis in a new NV memory",
+    ),
+    Option(
+        "execution_times", "execution_times", _choice(on=True, off=False), "on or off", "on",
+        "commands take the times of page 29, and each byte of NV memory 1 ms to fetch",
+    ),
+    Option(
+        "overrun", "overrun", _choice(on=True, off=False), "on or off", "off",
+        "a character is lost that comes, in bit time, before the last was read (page 25)",
+    ),
+    Option(
+        "inputs", "encoder", _choice(step=False, encoder=True), "step or encoder", "step",
+        "what STEP and DIR are: step and direction, or the phases of an encoder (DCB-274-E)",
+    ),
+    Option(
+        "port4", "p4_input", _choice(output=False, input=True), "output or input", "output",
+        "jumpers JP1 and JP2 of port 4",
+    ),
+)  # fmt: skip
+
+
 MODELS: dict[str, Model] = {
     "gs-c200": _gsc200("gs-c200", (*_GSC200_OPTIONS, _GSC200_REVISION)),
     "gs-c200s": _gsc200("gs-c200s", _GSC200_OPTIONS),
@@ -288,4 +323,16 @@ MODELS: dict[str, Model] = {
     ),
     "bs0610": _genstepper("bs0610", "RS-232"),
     "bs0710": _genstepper("bs0710", "USB"),
+    "dcb-274": Model(
+        "dcb-274",
+        "Advanced Micro Systems DCB-274 stepper motor driver/controller with SMC-27X2",
+        "docs/controllers/dcb274.md",
+        dcb274_pins.PINS,
+        dcb274_pins.DEFAULT_STRAPS,
+        _DCB274_OPTIONS,
+        Dcb274,
+        dcb274_program.language,
+        dcb274_commands.reference,
+        dcb274_pins.strap_line,
+    ),
 }

@@ -1,8 +1,8 @@
 """A line from a host to its units: every unit hears the host, the host hears every unit.
 
 With one unit that is a point-to-point connection, with several a multipoint one. Characters are delivered at
-the end of their last stop bit, or earlier where a receiver does not wait for it. The units' outputs share a wire on which a 0 wins: characters of two units that
-coincide in time merge bit by bit, and ones that only overlap are damaged.
+the end of their last stop bit, or earlier where a receiver does not wait for it. The units' outputs share a wire
+on which a 0 wins: characters of two units that coincide in time merge bit by bit, ones that overlap are damaged.
 """
 
 from typing import ClassVar, NamedTuple

@@ -186,6 +186,17 @@ class Starts(NamedTuple):
         return best
 
     @property
+    def holes(self) -> tuple[tuple[float, float], ...]:
+        """Where it failed below the highest rate it started into (resonance): first and last rate of each."""
+        found: list[tuple[float, float]] = []
+        inside = False
+        for rate, good in zip(self.rates, self.started, strict=True):
+            if not good and rate < self.highest:
+                found[-1:] = [(found[-1][0], rate)] if inside else [*found[-1:], (rate, rate)]
+            inside = not good
+        return tuple(found)
+
+    @property
     def highest(self) -> float:
         """The highest rate it started into: above `pull_in` where resonance leaves holes."""
         return max((rate for rate, good in zip(self.rates, self.started, strict=True) if good), default=0.0)

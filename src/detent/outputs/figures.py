@@ -78,7 +78,7 @@ def write(path: Path, signals: Signals, *, title: str = "", lanes: Sequence[Pin 
     check(path)
     figure = timeline_figure(signals, title=title, lanes=lanes)
     data = BytesIO()
-    with _style():
+    with style():
         kind = path.suffix.lower()[1:]
         no_date: dict[str, Any] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[
             kind
@@ -93,7 +93,7 @@ def timeline_figure(signals: Signals, *, title: str = "", lanes: Sequence[Pin | 
     `lanes` from top to bottom; None: the programs, and the pins that change (`chosen_lanes`). KeyError for a
     unit or pin that was not recorded, ImportError without matplotlib.
     """
-    with _style():
+    with style():
         from matplotlib.figure import Figure
 
         chosen = chosen_lanes(signals) if lanes is None else list(lanes)
@@ -121,7 +121,7 @@ def _changes(unit: UnitSignals, pin: str, until: Ns) -> bool:
     return bool((levels != UNKNOWN).any())
 
 
-def _style() -> Any:
+def style() -> Any:
     """The settings of all our figures, whatever the user's own are."""
     try:
         import matplotlib

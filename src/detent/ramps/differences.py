@@ -77,8 +77,11 @@ class Differences:
 
 def parse(text: str) -> Differences:
     """The table that `str` of one gives. Raises ValueError."""
-    first, interval, differences = text.strip().split(":")
-    return Differences(int(first), bytes.fromhex(differences), int(interval))
+    try:
+        first, interval, differences = text.strip().split(":")
+        return Differences(int(first), bytes.fromhex(differences), int(interval))
+    except ValueError as error:
+        raise ValueError(f"a table is written FIRST-N:CLOCKS:DIFFERENCES-IN-HEX ({error})") from error
 
 
 def nearest_count(speed: float | Fraction) -> int:

@@ -1,5 +1,4 @@
-"""GenStepper's law: speed and position accumulate on a tick of 16 us (BS0610 manual, page 32, "62,500 update tests
-per second").
+"""GenStepper's law: speed and position accumulate on a tick of 16 us (BS0610 manual, pages 20, 31, 32).
 
 On every tick the speed changes by P / 62 500 microsteps/s (or not), then the position grows by speed / 62 500; a
 step falls on the tick on which the whole part of the position changes. In integers: speeds in 1 / 62 500

@@ -82,7 +82,7 @@ class Rate(Number):
         return (abs(value) | (value < 0) << 15).to_bytes(2, "little")
 
     def unpack(self, data: bytes) -> int | None:
-        """The count, whatever somebody wrote there with `\\`: 1 and 2 mean the least, as in the timer."""
+        """The count, whatever somebody wrote there with a raw write: 1 and 2 mean the least."""
         word = int.from_bytes(data, "little")
         value = word & 0x7FFF
         if value == 0 or (word >> 15 and not self.signed):

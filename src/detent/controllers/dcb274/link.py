@@ -32,7 +32,7 @@ class Mode(Enum):
 
 def is_name(value: int) -> bool:
     """Whether a character may be a name. SPACE signs on, and the single-character commands are what they are."""
-    return value not in NOT_NAMES and value not in (SPACE, ESC, CTRL_N, CTRL_P)
+    return value <= LAST_PRINTABLE and value not in NOT_NAMES and value not in (SPACE, ESC, CTRL_N, CTRL_P)
 
 
 def next_name(value: int) -> int:
@@ -44,8 +44,11 @@ def next_name(value: int) -> int:
 
 
 class Entered(NamedTuple):
-    """What one character brings: `reply` goes back at once; `line` is complete if it is not None; `too_long` says
-    that more was typed than fits; `interrupt` is a single-character command for this axis."""
+    """What one character brings.
+
+    `reply` goes back at once; `line` is complete if it is not None; `too_long` says that more was typed than fits;
+    `interrupt` is a single-character command for this axis.
+    """
 
     reply: bytes = b""
     line: str | None = None
@@ -79,7 +82,8 @@ class SingleEntry:
     __slots__ = ("_text", "_too_long")
 
     def __init__(self) -> None:
-        self.clear()
+        self._text = bytearray()
+        self._too_long = False
 
     @property
     def empty(self) -> bool:
@@ -112,7 +116,7 @@ class SingleEntry:
 
     def clear(self) -> None:
         """Forget what was typed."""
-        self._text = bytearray()
+        self._text.clear()
         self._too_long = False
 
 
@@ -137,7 +141,9 @@ class NamedEntry:
     def __init__(self, name: int, *, passes: bool) -> None:
         self.name = name
         self._passes = passes
-        self.clear()
+        self._place = _Place.START
+        self._text = bytearray()
+        self._too_long = False
 
     @property
     def empty(self) -> bool:
@@ -148,6 +154,8 @@ class NamedEntry:
         """Take one character."""
         if self._place is _Place.START:
             return self._begin(value, _Place.MINE)
+        if self._place is _Place.TAKEN:
+            return self._taken(value)
         if self._place is not _Place.MINE:
             return self._foreign(value)
         if value == LF:
@@ -169,11 +177,8 @@ class NamedEntry:
                 self._place = _Place.TAKEN
                 echo = (value,) if self._passes else (self.name, value)
                 return Entered(bytes(echo), interrupt=value)
-            case _Place.TAKEN if value != LF:
-                return NOTHING
             case _Place.TAKEN:
-                self.clear()
-                return Entered(bytes((LF,)))
+                return self._taken(value)
             case _Place.MINE:
                 self._place = _Place.OTHERS  # a line that a program has cut off
         return self._foreign(value)
@@ -181,7 +186,7 @@ class NamedEntry:
     def clear(self) -> None:
         """As behind a LF."""
         self._place = _Place.START
-        self._text = bytearray()
+        self._text.clear()
         self._too_long = False
 
     def _begin(self, value: int, mine: _Place) -> Entered:
@@ -194,6 +199,12 @@ class NamedEntry:
             return Entered(passed)
         self._place = mine
         return Entered(passed if mine is _Place.MAYBE else bytes((value,)))
+
+    def _taken(self, value: int) -> Entered:
+        if value != LF:
+            return NOTHING
+        self.clear()
+        return Entered(bytes((LF,)))
 
     def _foreign(self, value: int) -> Entered:
         if value == LF:

@@ -66,6 +66,7 @@ class Motion:
         self.rested_at: Ns = -NEVER  # when the last motion ended
         self._origin = self._axis.shaft
         self._stopping = False  # on the way to rest, by a soft stop, M 0 or a new direction
+        self._stop_later = False  # a soft stop waits for the end of a ramp
         self._reversed: int | None = None  # M has turned: the period, with its sign, to go on with after the stop
         self._down_from = 0  # the pulse of an index at which its down ramp begins
         self._ramp_end = 0  # the pulse at which a constant velocity is reached
@@ -223,6 +224,13 @@ class Motion:
         self._axis.replan(stop, (), now)
         self._remark(now)
 
+    def soft_stop_after_ramp(self, now: Ns) -> None:
+        """A soft stop between two M: the ramp of the first is completed before (page 28)."""
+        if self.course is Course.VELOCITY and self.completing(now):
+            self._stop_later = True
+        else:
+            self.soft_stop(now)
+
     def halt(self, now: Ns) -> None:
         """ESC, a limit: the pulses stop at once."""
         if self._axis.moving:
@@ -267,7 +275,10 @@ class Motion:
         tripped = self._trip is not None and self.position(at) == self._trip
         if not self._axis.moving:
             return News(self._ended(at), tripped)
-        return News(pulse == self._ramp_end and self.course is Course.VELOCITY, tripped)
+        reached = pulse == self._ramp_end and self.course is Course.VELOCITY
+        if reached and self._stop_later:
+            self.soft_stop(at)
+        return News(reached, tripped)
 
     # -- inside ------------------------------------------------------------------------------------------
 
@@ -331,7 +342,8 @@ class Motion:
         if self.course is not Course.REST:
             self.rested_at = now
         self.course = Course.REST
-        self._stopping, self._reversed = False, None
+        self._stopping = self._stop_later = False
+        self._reversed = None
         self._ports.moving(False, self._axis.direction, now)
 
     def _remark(self, now: Ns) -> None:

@@ -17,7 +17,7 @@ from detent.controllers.dcb274.arguments import Address
 from detent.controllers.dcb274.commands import MODEL, ROWS, TABLE, Instruction, Op, Refusal
 
 END: Final = 0xFF
-AREAS: Final = (range(0, 193), range(256, 2048))  # where bytes of a program may stand (page 59)
+AREAS: Final = (range(193), range(256, 2048))  # where bytes of a program may stand (page 59)
 LONGEST: Final = max(row.length for row in TABLE)
 _BIT_15: Final = 0x80  # of the high byte
 
@@ -161,9 +161,7 @@ class SmcLanguage:
                 address += 1
                 continue
             instruction = decode(image[address : address + LONGEST])
-            if instruction is None or encode(commands.parse(commands.spell(instruction))) != image[
-                address : address + ROWS[instruction.op].length
-            ]:
+            if instruction is None or not _typed(instruction, image[address:]):
                 raise Damaged(f"byte {address} holds {image[address]:02X}h, with which no instruction begins")
             found.append((address, instruction))
             address += ROWS[instruction.op].length
@@ -178,6 +176,11 @@ class SmcLanguage:
         words = text.split(" ")
         words[1 + place] = label
         return " ".join(words)
+
+
+def _typed(instruction: Instruction, image: bytes) -> bool:
+    """Whether a command line gives just the bytes with which `image` begins: raw writes may have made others."""
+    return image.startswith(encode(commands.parse(commands.spell(instruction))))
 
 
 def language() -> Language[Instruction]:

@@ -32,7 +32,7 @@ class Trip:
         self._arm(now)
 
     def special(self, instruction: Instruction, counter: int, now: Ns) -> None:
-        """k or i: the outputs now, the next position, and the place of the instruction that is to run there."""
+        """Execute k or i: the outputs now, the next position, and the place of the instruction that is to run there."""
         position, data = instruction.values
         if instruction.op is Op.RESTART_TRIP:
             self._motion.set_origin(0, now)

@@ -55,14 +55,17 @@ class Work:
         return 1_000 * US * self.memory.nv_bytes(address, length) if self._times else 0
 
     def storing(self, address: int, length: int) -> Ns:
-        """How long program mode takes for an instruction: like ``\\`` for each byte in NV memory."""
+        """How long program mode takes for an instruction: a write for each byte in NV memory."""
         if not self._times:
             return AT_LEAST
         return COMMON + ROWS[Op.WRITE_MEMORY].time * self.memory.nv_bytes(address, length)
 
     def ready(self, instruction: Instruction, now: Ns) -> bool:
-        """Whether an instruction may execute now. An action waits for the completion of the one before (page 27);
-        an index or F after M waits for the ramp to rest that this begins."""
+        """Whether an instruction may execute now.
+
+        An action waits for the completion of the one before (page 27); an index or F after M waits for the ramp to
+        rest that this begins.
+        """
         if not ROWS[instruction.op].action:
             return True
         if self.motion.completing(now):

@@ -66,18 +66,18 @@ class Row(NamedTuple):
 
 
 TABLE: Final[tuple[Row, ...]] = (
-    Row(Op.LATCHES, "", Scope.BOARD, "Report what was latched, and clear it: 1 Y-, 2 Y+, 4 X-, 8 X+, 16 reset.", "29-30"),
-    Row(Op.VERBOSE, "bits", Scope.BOARD, "1: CR LF before and behind the text of an answer; 2: answer later, slower.", "35"),
+    Row(Op.LATCHES, "", Scope.BOARD, "Report and clear what was latched: 1 Y-, 2 Y+, 4 X-, 8 X+, 16 reset.", "29-30"),
+    Row(Op.VERBOSE, "bits", Scope.BOARD, "1: CR LF before and behind the text of an answer; 2: later, slower.", "35"),
     Row(Op.RESET, "1/64 steps, 1-64", Scope.BOARD, "Reset, with a microstep of so many 1/64 steps (0: 1/16).", "37",
         blinds=True),
     Row(Op.REPORT, "report or memory", Scope.MOTORS, "Report: -1 to -12, 0 for -1 to -11, 1-255 memory.", "39-44"),
-    Row(Op.AUTO, "microsteps/s", Scope.BOARD, "Full steps with full power while rate / 256 is above VALUE / 256.", "24"),
+    Row(Op.AUTO, "microsteps/s", Scope.BOARD, "Full steps, full power while rate / 256 is above VALUE / 256.", "24"),
     Row(Op.DIRECT, "bits", Scope.BOARD, "Steps by pulses on the slew inputs: 1 a line each way, 2 step and direction, "
         "+4 currents by limit inputs, +16 Y- +32 Y+ +64 X- +128 X+ inverted; 0 ends it.", "25-26, 46-47"),
     Row(Op.HALF, "0 or 1", Scope.BOARD, "1: half power; 0: full power.", "28", blinds=True),
-    Row(Op.MODE, "0-3", Scope.MOTORS, "Step mode: 0 single winding, 1 half step, 2 double winding, 3 microstep.", "30-31",
+    Row(Op.MODE, "0-3", Scope.MOTORS, "Step mode: 0 one winding, 1 half step, 2 two windings, 3 microstep.", "30-31",
         blinds=True),
-    Row(Op.LIMITS, "bits", Scope.BOARD, "Limits: 1 Y-, 2 Y+, 4 X-, 8 X+ blocked; +16 +32 +64 +128 active when high.", "34"),
+    Row(Op.LIMITS, "bits", Scope.BOARD, "Limits: 1 Y-, 2 Y+, 4 X-, 8 X+ blocked; times 16: active when high.", "34"),
     Row(Op.WINDINGS, "0-2", Scope.MOTORS, "Windings when idle: 0 off, 1 on, 2 half power.", "36", blinds=True),
     Row(Op.BOTH, "", Scope.CHOICE, "Both motors take the commands that follow.", "24"),
     Row(Op.X, "", Scope.CHOICE, "Motor X takes the commands that follow.", "36"),

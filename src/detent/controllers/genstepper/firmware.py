@@ -18,7 +18,7 @@ from detent.controllers.genstepper.inputs import FIRST_RATE, STANDARD_RATES, Lim
 from detent.controllers.genstepper.motor import DEFAULT_RATE, DEFAULT_SLOPE, LEAST_KEPT, Motor
 from detent.controllers.genstepper.pins import AXES, Order
 from detent.controllers.genstepper.prompter import Prompter
-from detent.controllers.genstepper.windings import CYCLE, Drive, Duties
+from detent.controllers.genstepper.windings import CYCLE, Duties
 from detent.controllers.genstepper.windings import drive as winding_drive
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind, PulseOutput
 from detent.ramps.tick_accumulator import UPDATES

@@ -31,9 +31,30 @@ class Action(Enum):
 class Motor:
     """One motor. `deadline` says when to call `advance`, which is True when the motor has come to rest."""
 
-    __slots__ = ("_axis", "_begin_tick", "_braking_slope", "_ends_at", "_go_keep", "_go_run", "_limit_tick", "_origin",
-                 "_limits", "_plan", "_time_zero", "action", "deadline", "direction", "idle_windings", "keep", "mark", "mode",
-                 "name", "rate", "slope", "target")  # fmt: skip
+    __slots__ = (
+        "_axis",
+        "_begin_tick",
+        "_braking_slope",
+        "_ends_at",
+        "_go_keep",
+        "_go_run",
+        "_limit_tick",
+        "_limits",
+        "_origin",
+        "_plan",
+        "_time_zero",
+        "action",
+        "deadline",
+        "direction",
+        "idle_windings",
+        "keep",
+        "mark",
+        "mode",
+        "name",
+        "rate",
+        "slope",
+        "target",
+    )  # fmt: skip
 
     def __init__(self, axis: Axis, limits: Limits) -> None:
         self._axis, self._limits = axis, limits

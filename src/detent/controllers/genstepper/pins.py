@@ -1,4 +1,4 @@
-"""The connectors of the two boards (manual, pages 59 to 63), their jumpers, and what the order chose (pages 11 to 13)."""
+"""The connectors of the two boards (manual, pages 59 to 63), their jumpers, what the order chose (pages 11 to 13)."""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -47,7 +47,7 @@ _COMMON: tuple[Pin, ...] = (
     Pin("VM", None, PinKind.SUPPLY, "motor supply, 4.5 to 34 V"),
     Pin("GND", None, PinKind.SUPPLY, "ground"),
     *(
-        Pin(winding(axis, name), None, _OUT, f"{axis} motor, {_MOTOR_HELP[name]}: 1 in each PWM period while driven", LOW)
+        Pin(winding(axis, name), None, _OUT, f"{axis} motor, {_MOTOR_HELP[name]}: 1 while it gets current", LOW)
         for axis in AXES
         for name in WINDINGS
     ),

@@ -22,7 +22,7 @@ _COSINE = tuple(round(FULL * cos(pi / 2 * place / STEP)) for place in range(STEP
 
 
 class Duties(NamedTuple):
-    """PWM counts, 0 .. FULL, of the four winding ends of a motor; the other end of a winding that is on is at ground."""
+    """PWM counts, 0 .. FULL, of the four winding ends of a motor; one end of a winding at most is driven."""
 
     wa1: int
     wa2: int

@@ -308,10 +308,10 @@ def reference(model: str) -> list[CommandHelp]:
 
 def row(model: str, op: Op) -> Row:
     """The row of `op` for `model`. ValueError if the model has no such command."""
-    rows(model)
     try:
         return _BY_OP[model][op]
     except KeyError:
+        rows(model)
         raise ValueError(f"the {model.upper()} has no command {op.name}") from None
 
 

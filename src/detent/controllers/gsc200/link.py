@@ -81,13 +81,12 @@ class Link:
             if data[0] != ord("0") + self.address:
                 return None
             body = data[1:]
-        shown = body.decode("latin-1")
-        if damaged:
-            return Frame(shown, damaged)
-        if len(data) > LONGEST:
-            return Frame(shown, f"longer than {LONGEST} characters")
-        if self.checksums:
+        fault = damaged
+        if not fault and len(data) > LONGEST:
+            fault = f"longer than {LONGEST} characters"
+        if self.checksums and not fault:
             if not body or self.checksum(data[:-1]) != data[-1]:
-                return Frame(shown, "checksum error")
-            body = body[:-1]
-        return Frame(body.decode("ascii"))
+                fault = "checksum error"
+            else:
+                body = body[:-1]
+        return Frame(body.decode("latin-1"), fault)

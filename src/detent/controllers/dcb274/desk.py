@@ -1,0 +1,278 @@
+"""The command that was typed: its four cycles, program mode, listings, NV memory, naming (pages 27, 47, 48, 49).
+
+Entry is the link's. A command is then held until the action before it is complete (the pending period), executes
+for its time, and answers with its result and the end of its line. While it is held or waits, only interrupts are
+taken; while it executes, characters wait.
+"""
+
+from enum import Enum
+from typing import Final, Protocol
+
+from detent.controllers.dcb274 import commands, settings
+from detent.controllers.dcb274.commands import ROWS, Instruction, Op, Refusal
+from detent.controllers.dcb274.link import CR, LF, Mode, is_name
+from detent.controllers.dcb274.memory import PAGE, PARAMETERS, PROTECTED, SHADOW, SIZE
+from detent.controllers.dcb274.program import END, allowed, encode
+from detent.controllers.dcb274.running import Running
+from detent.controllers.dcb274.work import Work
+from detent.controllers.device import Output, Refused, StoreImage
+from detent.ticks import MS, NEVER, Ns
+
+VERSION: Final = "V1.10"
+PAGE_OF_LISTING: Final = 20  # instructions (page 48)
+
+
+class Stage(Enum):
+    """Where the typed command is."""
+
+    FREE = "none"
+    HELD = "pending: the action before is not complete"
+    EXECUTING = "executing"  # until `timer`
+    STORING = "storing"  # until the owner of the NV memory answers, in the same instant
+    MOTION = "W: waiting for the motion"
+    WAIT = "W: waiting for its time"  # until `timer`
+    LISTING = "Q: waiting for a key"
+    NAMING = "^N: waiting for the name"
+
+
+_CLOSED = (Stage.HELD, Stage.MOTION, Stage.WAIT)
+_BUSY = (Stage.EXECUTING, Stage.STORING)
+
+
+class Speaker(Protocol):
+    """Where answers go: the firmware, which knows the mode."""
+
+    @property
+    def mode(self) -> Mode:
+        """How the controller listens."""
+
+    def send(self, text: str, now: Ns) -> None:
+        """Send characters as they are."""
+
+
+class Desk:
+    """The command in hand of one unit. `timer` says when to call `advance`; call `poll` after everything else."""
+
+    def __init__(self, work: Work, running: Running, speaker: Speaker, out: list[Output]) -> None:
+        self._work, self._running, self._speaker, self._out = work, running, speaker, out
+        self.reset()
+
+    def reset(self) -> None:
+        """Nothing in hand; not in program mode."""
+        self.stage = Stage.FREE
+        self.timer: Ns = NEVER
+        self.programming = False
+        self._address = 0  # of the next instruction in program mode, or in a listing
+        self._instruction: Instruction | None = None
+        self._image = b""  # what is being stored
+        self._cells: range | tuple[int, ...] = ()  # of it
+        self._result = ""  # of the command that stores
+        self._reload = False  # the parameters, when it is stored
+
+    @property
+    def busy(self) -> bool:
+        """Whether characters have to wait."""
+        return self.stage in _BUSY
+
+    @property
+    def closed(self) -> bool:
+        """Whether only interrupts are taken: the pending period, and W."""
+        return self.stage in _CLOSED
+
+    # -- entry -------------------------------------------------------------------------------------------
+
+    def enter(self, line: str, too_long: bool, now: Ns) -> None:
+        """A line is complete."""
+        try:
+            if too_long:
+                raise Refusal("the line is too long")
+            instruction = commands.parse(line)
+            self._check(instruction)
+        except Refusal as error:
+            self._refuse(line, str(error), now)
+            return
+        self._instruction = instruction
+        self.stage = Stage.HELD
+        self.poll(now)
+
+    def _check(self, instruction: Instruction) -> None:
+        """Whether it may be typed here. Raises Refusal."""
+        row = ROWS[instruction.op]
+        if self.programming:
+            if instruction.op is Op.PROGRAM:
+                return
+            if not row.stored:
+                raise Refusal(f"{row.letter} cannot be stored")
+            if not allowed(self._address, row.length):
+                raise Refusal(f"no program byte may stand at {PARAMETERS.start} to {PARAMETERS.stop - 1}, or at {SIZE}")
+        elif not row.typed:
+            raise Refusal(f"{row.letter} works in programs only")
+        elif instruction.op is Op.QUERY and self._speaker.mode.named:
+            raise Refusal("Q lists in single mode only")
+
+    def cancel(self, now: Ns) -> None:
+        """@ in the pending period: the command that waits is answered #."""
+        self._finish("#", now)
+
+    # -- execution ---------------------------------------------------------------------------------------
+
+    def poll(self, now: Ns) -> None:
+        """Look whether what the command waits for has come."""
+        if self.stage is Stage.HELD:
+            assert self._instruction is not None
+            if self.programming:
+                length = ROWS[self._instruction.op].length or 1
+                self.stage, self.timer = Stage.EXECUTING, now + self._work.storing(self._address, length)
+            elif self._work.ready(self._instruction, now):
+                self.stage, self.timer = Stage.EXECUTING, now + self._work.time(self._instruction)
+        elif self.stage is Stage.MOTION and not self._work.motion.indexing:
+            assert self._instruction is not None
+            self.stage, self.timer = Stage.WAIT, now + 10 * MS * self._instruction.values[0]
+
+    def advance(self, at: Ns) -> None:
+        """Deal with the deadline `at`."""
+        self.timer = NEVER
+        if self.stage is Stage.WAIT:
+            self._finish("", at)
+            return
+        instruction = self._instruction
+        assert instruction is not None
+        try:
+            if self.programming:
+                self._store_instruction(instruction, at)
+            else:
+                self._execute(instruction, at)
+        except Refusal as error:
+            self._refuse(commands.spell(instruction), str(error), at)
+
+    def _execute(self, instruction: Instruction, now: Ns) -> None:
+        work, values = self._work, instruction.values
+        match instruction.op:
+            case Op.WAIT:
+                self.stage = Stage.MOTION
+                self.poll(now)
+            case Op.GO:
+                self._finish("", now)
+                self._running.go(values[0], bool(values[1]), now)
+            case Op.TERMINATE:
+                work.motion.halt(now)
+                self._finish("", now)
+            case Op.PROGRAM:
+                self.programming, self._address = True, values[0]
+                self._finish("", now)
+            case Op.QUERY:
+                self._address = values[0]
+                self._speaker.send("\r\n", now)
+                self._list(PAGE_OF_LISTING, now)
+            case Op.SAVE:
+                cells = work.settings.cells() | dict(enumerate(work.memory.ram, SHADOW.start))
+                self._store(work.memory.with_bytes(cells), tuple(cells), now)
+            case Op.CLEAR:
+                self._clear(values[0], now)
+            case Op.WRITE_MEMORY:
+                self._store(work.memory.with_bytes({values[0]: values[1]}), (values[0],), now)
+            case _:
+                self._finish(work.obey(instruction, now, named=self._speaker.mode.named), now)
+
+    def _clear(self, page: int, now: Ns) -> None:
+        """C: reload the parameters (0), write factory values (1), or clear a page (2 to 8)."""
+        memory, result = self._work.memory, f" {VERSION}"
+        if page == 0:
+            self._reloaded(now)
+            self._finish(result, now)
+            return
+        first = (page - 1) * PAGE
+        cells = dict.fromkeys(range(first, first + PAGE), END)
+        if page == 1:
+            cells = {a: v for a, v in {**cells, **settings.factory("A")}.items() if a not in PROTECTED}
+        self._store(memory.with_bytes(cells), tuple(cells), now, result, reload=page == 1)
+
+    def _reloaded(self, now: Ns) -> None:
+        work = self._work
+        work.memory.load_shadow()
+        work.settings.load(work.memory)
+        work.trip.reset(now)
+        work.ports.show(now)
+
+    # -- NV memory ---------------------------------------------------------------------------------------
+
+    def _store_instruction(self, instruction: Instruction, now: Ns) -> None:
+        """Program mode: an instruction, or the end mark of the closing P, which ignores its address."""
+        if instruction.op is Op.PROGRAM:
+            self.programming = False
+            data = bytes((END,)) if allowed(self._address) else b""
+        else:
+            data = encode(instruction)
+        first, self._address = self._address, self._address + len(data)
+        cells = tuple(a for a in range(first, first + len(data)) if a not in SHADOW)
+        image = self._work.memory.put(first, data)
+        if image is None:
+            self._finish("", now)
+        else:
+            self._store(image, cells, now)
+
+    def _store(
+        self, image: bytes, cells: range | tuple[int, ...], now: Ns, result: str = "", *, reload: bool = False
+    ) -> None:
+        self.stage = Stage.STORING
+        self._image, self._cells, self._result, self._reload = image, cells, result, reload
+        self._out.append(StoreImage(now, image))
+
+    def store_name(self, name: int, now: Ns) -> None:
+        """^N: the name is stored at once."""
+        self._work.settings.name = name
+        self._store(self._work.memory.with_bytes({settings.NAME: name}), (settings.NAME,), now)
+
+    def stored(self, ok: bool, now: Ns) -> None:
+        """The image was stored, or not: then the memory is as it was, and the command is answered #."""
+        if self.stage is not Stage.STORING:
+            return
+        if ok:
+            self._work.memory.commit(self._image, self._cells)
+            if self._reload:
+                self._reloaded(now)
+        self._image = b""
+        self._finish(self._result if ok else "#", now)
+
+    # -- keys while listing or naming --------------------------------------------------------------------
+
+    def key(self, value: int, now: Ns) -> None:
+        """A key in a listing: CR the next 20 lines, any other one line."""
+        if value != LF:
+            self._list(PAGE_OF_LISTING if value == CR else 1, now)
+
+    def ask_name(self, now: Ns) -> None:
+        """^N."""
+        self.stage = Stage.NAMING
+        self._speaker.send("name?", now)
+
+    def name(self, value: int, now: Ns) -> bool:
+        """The name that was asked for; False for a character that is none."""
+        if is_name(value):
+            self._speaker.send(chr(value), now)
+            self.store_name(value, now)
+            return True
+        self._finish("#", now)
+        return False
+
+    def _list(self, lines: int, now: Ns) -> None:
+        """Lines of a listing; the last one is the bare end address."""
+        self.stage = Stage.LISTING
+        for _ in range(lines):
+            instruction = self._work.memory.instruction(self._address)
+            if instruction is None:
+                self._finish(str(self._address), now)
+                return
+            self._speaker.send(f"{self._address} {commands.spell(instruction)}\r\n", now)
+            self._address += ROWS[instruction.op].length
+
+    # -- answers -----------------------------------------------------------------------------------------
+
+    def _refuse(self, line: str, reason: str, now: Ns) -> None:
+        self._out.append(Refused(now, line, reason))
+        self._finish("#", now)
+
+    def _finish(self, result: str, now: Ns) -> None:
+        """Result and the end of the line: CR LF, or LF where lines have names."""
+        self.stage, self.timer, self._instruction = Stage.FREE, NEVER, None
+        self._speaker.send(result + ("\n" if self._speaker.mode.named else "\r\n"), now)
