@@ -46,7 +46,7 @@ def test_a_move_of_999999_steps_runs_to_its_end(capsys: pytest.CaptureFixture[st
 
 
 def test_for_ends_a_move_that_has_no_end(capsys: pytest.CaptureFixture[str]) -> None:
-    # S10 T100 R50: 90 909 091 ns for the ramp, then 1000 steps/s
+    # S10 T100 R50: 90 909 091 ns for the ramp of 50 steps, then 1000 steps/s
     found = result(capsys, "gs-c200s", "--send", "g+", "--no-line-timing", "--for", "2 s")
     assert found["time_ns"] == 2_000_000_000
     assert found["units"] == {"gs-c200s": {"position": 1959, "pulses": 1959, "state": "running"}}

@@ -3,13 +3,13 @@
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
-from detent.cell.detector import StepDetector
-from detent.cell.switches import Switch
 from tests.controllers import conformance
 from tests.controllers.conformance import Candidate, schedules
 from tests.controllers.gsc200 import inputs
 from tests.controllers.supersigma import inputs as supersigma
+
+from detent.cell.detector import StepDetector
+from detent.cell.switches import Switch
 
 CANDIDATES = (*inputs.CANDIDATES, *supersigma.CANDIDATES, Candidate("step detector", StepDetector, None, ["CLOCK"]),
               Candidate("switch", lambda: Switch(1), None, ["SET"]))  # fmt: skip

@@ -10,10 +10,12 @@ from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
 from detent.cell.cell import Cell, Store, Wiring, no_store
 from detent.cell.deeds import Action, Power, SetSwitch, Type
 from detent.cell.description import Description, Problem, ScriptEntry, Unit
+from detent.cell.fitting import check_names, mechanics, motors_by_axis
+from detent.cell.mechanics import Mechanics
 from detent.cell.parts import PARTS, Part
 from detent.cell.switches import AxisSwitch, Switch
 from detent.controllers import catalogue
-from detent.controllers.catalogue import CatalogueError, Model
+from detent.controllers.catalogue import NO_LIMITS, CatalogueError, Model
 from detent.controllers.device import Controller, Device
 from detent.lines.line import Line
 from detent.lines.microbus import Microbus
@@ -60,7 +62,8 @@ class _Builder:
         self.parts: list[Device] = []
         self.net_of: dict[tuple[int, str], int] = {}
         self.nets: list[list[_End]] = []
-        self.axes: dict[int, int] = {}  # switch -> the unit whose axis it follows
+        self.axes: dict[int, int] = {}  # switch or motor -> the unit whose axis it follows
+        self.contacts: dict[str, int] = {}  # switch that a rotor moves -> the motor
 
     def problem(self, key: str, message: str) -> Problem:
         return Problem(self.description.file, key, message)
@@ -70,6 +73,7 @@ class _Builder:
     ) -> Cell:
         lines = self.line_units()
         self.make_units(lines, line_timing)
+        self.make_motors(record)
         self.make_switches()
         self.join_wires()
         actions = [action for n, entry in enumerate(self.description.script, 1) for action in self.actions(n, entry)]
@@ -88,6 +92,7 @@ class _Builder:
         for name, unit in self.description.units.items():
             key = f"units.{name}"
             found = self.models[name]
+            self.check_electrics(key, found, unit)
             try:
                 keywords = catalogue.option_values(found, unit.options)
             except CatalogueError as error:
@@ -98,6 +103,19 @@ class _Builder:
                 device = found.make(**keywords)
             self.names.append(name)
             self.parts.append(device)
+
+    def check_electrics(self, key: str, found: Model | Part, unit: Unit) -> None:
+        """The supply and the loads that the cell states are within what the model stands."""
+        limits = found.limits if isinstance(found, Model) else NO_LIMITS
+        low, high = limits.supply
+        if unit.supply is not None and not low <= unit.supply <= high:
+            raise self.problem(f"{key}.supply", f"{unit.supply:g} V: a {found.name} takes {low:g} to {high:g} V")
+        for pin, load in unit.loads.items():
+            if pin not in limits.loads:
+                raise self.problem(f"{key}.loads", str(catalogue.unknown("supply output", pin, tuple(limits.loads))))
+            if not 0 <= load <= limits.loads[pin]:
+                most = f"{pin} gives at most {limits.loads[pin] * 1000:g} mA"
+                raise self.problem(f"{key}.loads", f"{load * 1000:g} mA from {pin}: {most}")
 
     def straps(self, lines: Mapping[str, list[str]]) -> dict[str, dict[str, Level]]:
         """The straps of every controller, completed line by line."""
@@ -185,16 +203,46 @@ class _Builder:
 
     # -- switches and wires ------------------------------------------------------------------------------
 
+    def make_motors(self, record: bool) -> None:
+        described = self.description
+        check_names(described, [*described.units, *described.switches])
+        on_axis = motors_by_axis(described)
+        for name, entry in described.motors.items():
+            if entry.unit is not None:
+                self.need_unit(f"motors.{name}.unit", entry.unit)
+                if entry.unit not in self.axis_units():
+                    raise self.problem(f"motors.{name}.unit", f"{entry.unit} moves no axis: name a controller")
+                axes = self.controller(entry.unit).axes
+                if entry.axis not in axes:
+                    raise self.problem(f"motors.{name}.axis", str(catalogue.unknown("axis", entry.axis, axes)))
+            mine = {
+                switch: place
+                for switch, place in described.switches.items()
+                if place.axis is not None and (place.axis == name or on_axis.get((place.axis, "")) == name)
+            }
+            shaft = described.units[entry.unit].shaft if entry.unit is not None else 0
+            for switch in mine:
+                self.contacts[switch] = len(self.parts)
+            if entry.unit is not None:
+                self.axes[len(self.parts)] = self.names.index(entry.unit)
+            self.names.append(name)
+            self.parts.append(mechanics(described, name, mine, shaft, record))
+
     def make_switches(self) -> None:
         for name, entry in self.description.switches.items():
             if name in self.description.units:
                 raise self.problem(f"switches.{name}", "a unit has this name already: choose another")
+            if name in self.contacts:
+                continue  # the rotor moves it
             switch = Switch(entry.level)
             if entry.axis is not None:
+                if any(place is not None and place != int(place) for place in entry.range):
+                    raise self.problem(f"switches.{name}", "places on an axis without a motor are whole steps")
                 self.need_unit(f"switches.{name}.axis", entry.axis)
                 if entry.axis not in self.axis_units():
                     raise self.problem(f"switches.{name}.axis", f"{entry.axis} moves no axis: name a controller")
-                switch = AxisSwitch(*entry.range, entry.inside, self.description.units[entry.axis].shaft)
+                low, high = (None if place is None else int(place) for place in entry.range)
+                switch = AxisSwitch(low, high, entry.inside, self.description.units[entry.axis].shaft)
                 self.axes[len(self.parts)] = self.names.index(entry.axis)
             self.names.append(name)
             self.parts.append(switch)
@@ -202,7 +250,12 @@ class _Builder:
     def join_wires(self) -> None:
         for name, entry in self.description.switches.items():
             key = f"switches.{name}.drives"
-            contact = _End(self.names.index(name), Switch.pins[0], name)
+            if name in self.contacts:
+                motor = self.parts[self.contacts[name]]
+                pin = next(pin for pin in motor.pins if pin.name == name)
+                contact = _End(self.contacts[name], pin, name)
+            else:
+                contact = _End(self.names.index(name), Switch.pins[0], name)
             for target in entry.drives:
                 self.join(key, contact, self.end(key, target))
         for n, wire in enumerate(self.description.wires, 1):
@@ -217,7 +270,8 @@ class _Builder:
         name, dot, pin = text.partition(".")
         if not dot:
             raise self.problem(key, f"{text!r} names no pin: write UNIT.PIN")
-        self.need_unit(key, name)
+        if name not in self.description.motors:
+            self.need_unit(key, name)
         wired = [p for p in self.parts[self.names.index(name)].pins if p.kind.drives or p.kind.reads]
         for found in wired:
             if found.name == pin:
@@ -264,6 +318,11 @@ class _Builder:
         for part, pins in enumerate(drives):
             for pin in pins:
                 self.parts[part].watch(pin)
+        for ends in reads:
+            for part, pin in ends:
+                found = self.parts[part]
+                if isinstance(found, Mechanics):
+                    found.wired(pin)
         followers = [tuple(s for s, unit in self.axes.items() if unit == part) for part in range(len(self.parts))]
         hears: list[tuple[tuple[int, str], ...]] = []
         speaks: list[dict[str, tuple[int, int]]] = [{} for _ in range(units)]

@@ -1,9 +1,9 @@
 """The scheduler: who is due when, and what reaches whom.
 
-Order within one instant (the contract of `controllers.device`): parts that are due are advanced in file
-order; what they did is delivered in rounds, parts in file order, their outputs in the order they were made
-and never merged; what a round causes is delivered in the next. More than `MOST_DELIVERIES` in one instant
-is an oscillation, and an error that names its pins.
+Order within one instant (the contract of `controllers.device`): units that are due are advanced in file
+order, switches after them; what they did is delivered in rounds, parts in file order, their outputs in the
+order they were made and never merged; what a round causes is delivered in the next. More than
+`MOST_DELIVERIES` in one instant is an oscillation, and an error that names its pins.
 """
 
 import copy
@@ -130,11 +130,21 @@ class Cell:
     def _advance(self, at: Ns) -> None:
         """One instant: the parts' own deadlines, then pins and power, then characters."""
         self.now = at
+        units, contacts = self.wiring.units, False
         for index, deadline in enumerate(self._deadlines):
             if deadline <= at:
-                self.parts[index].advance(at)
-                self._touched.add(index)
+                if index < units:
+                    self.parts[index].advance(at)
+                    self._touched.add(index)
+                else:
+                    contacts = True
         self._settle()
+        if contacts:  # a pulse that was held in this instant has crossed no switch
+            for index in range(units, len(self.parts)):
+                if self._deadlines[index] <= at:
+                    self.parts[index].advance(at)
+                    self._touched.add(index)
+            self._settle()
         if self._script_deadline <= at:
             self._act(at)
         if self._line_deadline <= at:

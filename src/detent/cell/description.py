@@ -7,7 +7,7 @@ business; this module is given text.
 import tomllib
 from collections.abc import Mapping
 from difflib import get_close_matches
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
@@ -62,6 +62,8 @@ class Unit(_Table):
     options: dict[str, int | float | str] = {}
     powered: bool = True  # when the cell starts
     shaft: int = 0  # where the axis stands when the cell starts, in steps
+    supply: float | None = None  # V, checked against the model's limits
+    loads: dict[str, float] = {}  # A drawn from supply outputs by pin, checked likewise
 
 
 class Wire(_Table):
@@ -76,9 +78,9 @@ class Switch(_Table):
 
     drives: Names
     level: LevelField = HIGH  # when the cell starts; an axis decides for itself
-    axis: str | None = None  # the unit whose axis moves the contact
-    start: int | None = Field(None, validation_alias=AliasChoices("from"))
-    end: int | None = Field(None, validation_alias=AliasChoices("to"))
+    axis: str | None = None  # the unit, or the motor, whose axis moves the contact
+    start: int | float | None = Field(None, validation_alias=AliasChoices("from"))  # steps; on a motor, its distance
+    end: int | float | None = Field(None, validation_alias=AliasChoices("to"))
     at: int | None = None  # the same as from and to
     inside: LevelField = LOW  # the level between from and to
 
@@ -96,9 +98,47 @@ class Switch(_Table):
         return self
 
     @property
-    def range(self) -> tuple[int | None, int | None]:
-        """First and last step at which the level is `inside`."""
+    def range(self) -> tuple[int | float | None, int | float | None]:
+        """First and last place at which the level is `inside`."""
         return (self.at, self.at) if self.at is not None else (self.start, self.end)
+
+
+class Current(_Table):
+    """The phase current by the state of the axis, A: ramp, slew, rest (MOV, RAMP), or run and hold `after` the last step."""
+
+    ramp: float = 0.0
+    slew: float = 0.0
+    rest: float = 0.0
+    run: float = 0.0
+    hold: float = 0.0
+    after: DurationField = 0
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> "Current":
+        if (self.run > 0) == (self.ramp > 0):
+            raise ValueError("give ramp, slew and rest (with MOV and RAMP wired), or run, hold and after")
+        return self
+
+
+class Motor(_Table):
+    """``[motors.NAME]``: a motor with drive and load on the axis of a unit, or on step pulses that a wire brings."""
+
+    motor: str
+    unit: str | None = None
+    axis: str = ""  # where the unit has several
+    supply: float  # V
+    current: float | Current | None = None  # A in each phase with both on; the motor's rating
+    step: str = "half"
+    decay: Literal["fast", "slow", "auto", "voltage"] = "fast"
+    threshold: float = 0.0  # full steps/s from which on decay is fast (auto)
+    drop: float = 0.0  # V in the switches
+    resistance: float = 0.0  # ohm of switches and wires
+    fitted: bool = False  # to the maker's torque curve
+    data: dict[str, float] = {}  # numbers of the motor that are different: SI units
+    load: dict[Literal["inertia", "friction", "viscous", "torque"], float] = {}
+    lead: float | None = None  # distance a step: then places of switches are distances
+    reverse: bool = False  # plus turns the motor the other way
+    window: float = 0.5  # steps that the step detector takes for made
 
 
 class Line(_Table):
@@ -106,6 +146,18 @@ class Line(_Table):
 
     units: Names
     endpoint: str | None = None  # 'pty', 'pty:LINK', 'tcp:HOST:PORT' or 'serial:DEVICE'
+    host: str | None = None  # the unit that is the host of this line: an adapter, which has a line of its own
+    kind: str | None = None  # 'daisy-chain': the host to the first unit, each unit to the next, the last to the host
+
+    @model_validator(mode="after")
+    def _sane(self) -> "Line":
+        if self.kind not in (None, "daisy-chain"):
+            raise ValueError("kind is 'daisy-chain', or left out")
+        if self.host is not None and self.kind is not None:
+            raise ValueError("a daisy chain has no host among the units: give either host or kind")
+        if self.host is not None and self.endpoint is not None:
+            raise ValueError("the host of this line is a unit: give the endpoint to the line of that unit")
+        return self
 
 
 class ScriptEntry(_Table):
@@ -131,6 +183,7 @@ class Description(_Table):
     units: dict[str, Unit]
     wires: list[Wire] = []
     switches: dict[str, Switch] = {}
+    motors: dict[str, Motor] = {}
     lines: dict[str, Line] = {}
     script: list[ScriptEntry] = []
     file: str = ""
@@ -199,7 +252,7 @@ def _fault(item: Any, data: dict[str, Any]) -> tuple[str, str]:
 def _known(location: tuple[int | str, ...]) -> list[str]:
     """The keys that the table of a wrong key takes."""
     tables: dict[str, type[BaseModel]] = {
-        "units": Unit, "wires": Wire, "switches": Switch, "lines": Line, "script": ScriptEntry
+        "units": Unit, "wires": Wire, "switches": Switch, "motors": Motor, "lines": Line, "script": ScriptEntry
     }  # fmt: skip
     table = tables.get(str(location[0]), Description) if len(location) > 1 else Description
     names = []

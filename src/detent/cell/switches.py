@@ -74,16 +74,17 @@ class AxisSwitch(Switch):
         super().__init__(self._level_at(shaft))
 
     def follow(self, motion: MotionStarted | MotionCut | MotionEnded) -> None:
-        """The axis starts, stops or changes its mind. A change that is due in this very instant still comes."""
+        """The axis starts, stops or changes its mind. What the pulses given so far have crossed comes first."""
         if motion.axis != self._axis:
             return
-        match motion:
-            case MotionStarted():
-                self._motion = motion
-                self._plan(motion, motion.first)
-            case MotionCut() | MotionEnded():
-                if self._pulse > motion.last:
-                    self.deadline = NEVER
+        last = motion.first - 1 if isinstance(motion, MotionStarted) else motion.last
+        while self.deadline <= motion.at and self._pulse <= last:
+            self._cross()
+        if isinstance(motion, MotionStarted):
+            self._motion = motion
+            self._plan(motion, motion.first)
+        else:
+            self.deadline = NEVER
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
         """A hand may hold the contact; the axis moves it on at its next edge."""
@@ -91,10 +92,14 @@ class AxisSwitch(Switch):
 
     def advance(self, now: Ns) -> None:
         """The shaft crosses an edge."""
-        while self.deadline <= now and self._motion is not None:
-            motion, pulse = self._motion, self._pulse
-            self._change(self._level_at(motion.shaft + motion.direction * pulse), self.deadline)
-            self._plan(motion, pulse + 1)
+        while self.deadline <= now:
+            self._cross()
+
+    def _cross(self) -> None:
+        motion, pulse = self._motion, self._pulse
+        assert motion is not None
+        self._change(self._level_at(motion.shaft + motion.direction * pulse), self.deadline)
+        self._plan(motion, pulse + 1)
 
     def _level_at(self, shaft: int) -> Level:
         within = (self._low is None or shaft >= self._low) and (self._high is None or shaft <= self._high)

@@ -1,6 +1,7 @@
 """The verb `demo`: an example cell, run in virtual time, told and drawn."""
 
 import json as json_text
+import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -171,4 +172,12 @@ def _print_end(cell: "Cell", told: list[Told], files: Mapping[str, Path], place:
     print(f"Look at   {files['figure']}   with any viewer of pictures: positions, speeds, handshake")
     print(f"     and  {files['waveforms']}   with gtkwave or PulseView: every pin, every pulse, to the nanosecond")
     print("Run it live, with a serial port for each unit:")
-    print(f"    {'detent' if sys.argv[0].endswith('detent') else 'python -m detent'} serve {shown}")
+    print(f"    {_called()} serve {shown}")
+
+
+def _called() -> str:
+    """How this command was called, to be typed again."""
+    name = Path(sys.argv[0]).name
+    if name != "detent":
+        return "python -m detent"
+    return name if shutil.which(name) == sys.argv[0] else sys.argv[0]

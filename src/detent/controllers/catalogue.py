@@ -47,6 +47,16 @@ class Option(NamedTuple):
     help: str
 
 
+class Limits(NamedTuple):
+    """What the manual allows: the supply in V, least and most, and the load of each supply output in A."""
+
+    supply: tuple[float, float] = (0.0, float("inf"))
+    loads: Mapping[str, float] = {}
+
+
+NO_LIMITS = Limits()
+
+
 class Model(NamedTuple):
     """One model of the catalogue."""
 
@@ -63,6 +73,7 @@ class Model(NamedTuple):
     line: str = "serial"  # the kind of line it sits on
     told_apart_by: str = ""  # the option, an attribute of the controller too, in which units of one line must differ
     answered: Callable[[str], bool] = lambda text: True  # whether a host gets an answer to a command line
+    limits: Limits = NO_LIMITS
 
 
 def unknown(kind: str, name: str, known: Sequence[str]) -> CatalogueError:
@@ -224,6 +235,7 @@ def _gsc200(name: str, options: tuple[Option, ...]) -> Model:
         lambda: gsc200_program.language(name),
         lambda: gsc200_commands.reference(name),
         gsc200_pins.strap_line,
+        limits=Limits(gsc200_pins.SUPPLY_V, gsc200_pins.LOADS_A),
     )
 
 

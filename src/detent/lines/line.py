@@ -29,7 +29,7 @@ class Arrival(NamedTuple):
     sent: Sent
 
 
-class _Talking(NamedTuple):
+class Talking(NamedTuple):
     """A character of a unit that is on the wire, as it will arrive."""
 
     began: Ns
@@ -45,6 +45,7 @@ class Line:
 
     __slots__ = ("_early", "_from_units", "_host", "_on_wire", "_start_bits", "_told", "deadline", "format", "heard")
 
+    hosted: ClassVar[bool] = False  # whether its host is a unit of the cell
     strobe: ClassVar[str] = ""  # the input of every unit that the line drives, if it has such a wire
 
     def __init__(self, form: Format, *, timed: bool = True, early: Ns = 0, start_bits: bool = False) -> None:
@@ -55,7 +56,7 @@ class Line:
         self.heard: list[Heard] = []  # what reached the host and was not taken yet
         self._on_wire: list[Sent] = []  # from the host; also the transmitter's outbox
         self._host = Transmitter(HOST_PORT, form, self._on_wire, timed=timed)
-        self._from_units: list[_Talking] = []
+        self._from_units: list[Talking] = []
 
     def send(self, data: bytes, now: Ns) -> None:
         """The host sends `data`, behind what it is still sending. A byte too wide for the line arrives damaged."""
@@ -81,7 +82,7 @@ class Line:
             if other.done > began:
                 self._from_units[index] = other._replace(char=other.char._replace(framing_ok=False))
                 char = char._replace(framing_ok=False)
-        self._from_units.append(_Talking(began, done, char))
+        self._from_units.append(Talking(began, done, char))
         self._plan()
 
     def advance(self, now: Ns) -> list[Arrival]:

@@ -35,11 +35,13 @@ class Sequencer:
     behind the last of them (standstill, hold current) comes with the next pulses, or with `up_to`.
     """
 
-    __slots__ = ("drive", "last", "level", "mode", "place", "row", "stride", "_held", "_slowed")
+    __slots__ = ("_base", "_held", "_slowed", "drive", "last", "level", "mode", "on", "place", "row", "stride")
 
     def __init__(self, drive: Drive, place: int = 0, stride: int = 1) -> None:
         self.drive = drive
         self.place, self.row, self.mode = place, 0, drive.mode
+        self.on = True  # the windings have current at all
+        self._base = drive.mode
         self.stride = stride  # places a pulse
         self.level = drive.currents.rest if drive.currents.after else drive.currents.ramp
         self.last: Ns = -NEVER  # the last pulse
@@ -54,7 +56,7 @@ class Sequencer:
         first = self.up_to(int(times[0]))
         places = self.place + self.stride * np.cumsum(np.broadcast_to(np.asarray(directions, np.int64), (count,)))
         levels = np.full(count, self._running())
-        modes = np.full(count, self.drive.mode, np.int64)
+        modes = np.full(count, self._base, np.int64)
         standstill = self.drive.standstill
         if standstill < NEVER:
             before = np.concatenate(([max(self.last, int(times[0]) - 2 * standstill)], times[:-1]))
@@ -65,7 +67,7 @@ class Sequencer:
         gaps = np.flatnonzero(np.diff(times) > wanted) if wanted < NEVER else np.empty(0, np.int64)
         self.place, self.level, self.mode = int(places[-1]), float(levels[-1]), int(modes[-1])
         self.last = int(times[-1])
-        self._held, self._slowed = not after, self.mode == self.drive.mode
+        self._held, self._slowed = not after, self.mode == self._base
         if len(gaps):
             change = self._with_pauses(change, gaps)
         return joined(first, change)
@@ -78,7 +80,8 @@ class Sequencer:
             if what == "slow":
                 self._slowed, self.mode = True, SLOW
             else:
-                self._held, self.level = True, self.drive.currents.rest
+                self._held = True
+                self.level = self.drive.currents.rest if self.on else 0.0
             rows.append((at, self.place, self.level, self.row, self.mode))
         return _changes(*zip(*rows, strict=True)) if rows else _changes([], [], [], [], [])
 
@@ -98,7 +101,18 @@ class Sequencer:
         """When the current falls to its hold value."""
         return NEVER if self._held else self.last + self.drive.currents.after
 
+    @property
+    def own_level(self) -> float:
+        """The factor that a drive with currents of its own (run and hold) gives now."""
+        return self.drive.currents.rest if self._held else self.drive.currents.ramp
+
+    def set_mode(self, mode: int) -> None:
+        """Somebody outside chooses the decay."""
+        self._base = self.mode = mode
+
     def _running(self) -> float:
+        if not self.on:
+            return 0.0
         return self.drive.currents.ramp if self.drive.currents.after else self.level
 
     def _with_pauses(self, change: Changes, gaps: Int64) -> Changes:
@@ -109,7 +123,7 @@ class Sequencer:
             parts.append(Changes(*(column[begin : gap + 1] for column in change)))
             self.place, self.level, self.mode = int(change.places[gap]), float(change.levels[gap]), int(change.modes[gap])
             self.last = int(change.times[gap])
-            self._held, self._slowed = not self.drive.currents.after, self.mode == self.drive.mode
+            self._held, self._slowed = not self.drive.currents.after, self.mode == self._base
             parts.append(self.up_to(int(change.times[gap + 1])))
             begin = gap + 1
         parts.append(Changes(*(column[begin:] for column in change)))

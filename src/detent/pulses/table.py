@@ -17,6 +17,7 @@ LIMIT = 1 << 62
 class Rows(Immutable):
     """The columns of a table with their running sums: read-only int64 arrays of one length, shared by parts.
 
+    Equal if their columns are.
     `counts` and `periods` are whole numbers of at least 1. ValueError for others, and for columns of different
     lengths; OverflowError for a table of 2**62 ticks or more.
     """
@@ -33,6 +34,14 @@ class Rows(Immutable):
         self.pulses, self.ticks = _sums(self.counts), _sums(self.counts * self.periods)
         # bisect wants plain integers; a memoryview gives them without a second copy
         self.pulses_list, self.ticks_list = self.pulses.data, self.ticks.data
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Rows):
+            return NotImplemented
+        return np.array_equal(self.counts, other.counts) and np.array_equal(self.periods, other.periods)
+
+    def __hash__(self) -> int:
+        return hash((len(self.counts), self.pulses_list[-1], self.ticks_list[-1]))
 
 
 def _column(values: npt.ArrayLike, name: str) -> Int64Array:

@@ -85,7 +85,7 @@ class Train(Immutable):
 
     def fixed_time(self, n: int) -> Fixed:
         """The instant of pulse n (0: the start), floor. IndexError outside 0..steps."""
-        shape = self._shape
+        shape, n = self._shape, int(n)
         if n <= 0:
             if n < 0:
                 raise self._no_pulse(n)
@@ -109,6 +109,7 @@ class Train(Immutable):
 
     def steps_by(self, t: Ns) -> int:
         """How many pulses have their ns at or before `t`: 0 .. steps."""
+        t = int(t)  # an element of an array would overflow
         # rounded half up, an instant is at or before t when it is before t + 1/2
         limit = (t << FIXED_BITS) + HALF_NS - self.start
         shape = self._shape
@@ -119,6 +120,7 @@ class Train(Immutable):
 
     def state_at(self, t: Ns) -> State:
         """Steps, phase and rate at `t`."""
+        t = int(t)
         steps = self.steps_by(t)
         shape, instant = self._shape, (t << FIXED_BITS) - self.start
         i = bisect_right(shape.begins, instant) - 1

@@ -43,7 +43,7 @@ def obey(loop: LoopMotor, letter: str, value: object) -> None:
             loop.set_position(value)
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(orders, st.integers(1, 120_000_000)), min_size=1, max_size=8))
 def test_commands_in_motion_give_the_steps_of_the_tick_by_tick_loop(story):
     board = BOARD.copy()

@@ -34,6 +34,14 @@ def test_page_24_a_sign_alone_is_a_direction_until_a_command_or_a_digit_comes():
         assert typed(text).slew() == 0, text
 
 
+def test_a_sign_that_has_slewed_slews_again_and_does_not_belong_to_the_next_number():
+    value = Value()
+    value.take("-")
+    assert (value.slew(), value.slew()) == (-1, -1)
+    value.take("1")
+    assert (value.slew(), value.number()) == (0, 1)
+
+
 @given(st.integers(-LARGEST, LARGEST))
 def test_every_position_can_be_typed(number):
     assert typed(str(number)).number() == number

@@ -3,17 +3,18 @@
 from collections.abc import Callable
 
 from hypothesis import strategies as st
+from tests.controllers.conformance import Candidate
 
 from detent.controllers.supersigma.firmware import Supersigma
 from detent.ramps.short_movements import Way
 from detent.ticks import MS, US, Ns
 from detent.uart import Char
-from tests.controllers.conformance import Candidate
 
 INPUTS = ("RAIL", "FORCE", "T0")
 NUMBER = 1
 
 CODES = st.sampled_from([1, 2, 3, 4, 5, 6, 7, 0x81, 0x82, 0x83]) | st.integers(0, 255)
+FEW = st.sampled_from([0, 1, 2]) | st.integers(0, 420)
 STEPS = st.sampled_from([0, 1, 2, 403, 404, 5143, 5144, 65_535]) | st.integers(0, 900) | st.integers(0, 65_535)
 SPEEDS = st.sampled_from([0, 1, 6, 60, 255])
 
@@ -23,7 +24,6 @@ def _message(number: int, code: int, steps: int, speed: int) -> bytes:
     return bytes([number, code]) + steps.to_bytes(2, "big") * (low in (1, 2, 3)) + bytes([speed]) * (low in (2, 3))
 
 
-MESSAGES = st.builds(_message, st.sampled_from([NUMBER, NUMBER, NUMBER, 0, 2]), CODES, STEPS, SPEEDS)
 GARBAGE = st.binary(min_size=1, max_size=6)
 
 
@@ -31,7 +31,10 @@ def _spaced(data: bytes, gap: Ns) -> list[tuple[Ns, Char]]:
     return [(gap if index else 0, Char(value)) for index, value in enumerate(data)]
 
 
-FRAMES = st.builds(_spaced, MESSAGES | MESSAGES | MESSAGES | GARBAGE, st.sampled_from([0, 50 * US, 3 * MS]))
+def frames(steps: st.SearchStrategy[int]) -> st.SearchStrategy[list[tuple[Ns, Char]]]:
+    """Messages with such steps, and garbage."""
+    messages = st.builds(_message, st.sampled_from([NUMBER, NUMBER, NUMBER, 0, 2]), CODES, steps, SPEEDS)
+    return st.builds(_spaced, messages | messages | messages | GARBAGE, st.sampled_from([0, 50 * US, 3 * MS]))
 
 
 def _wired() -> Supersigma:
@@ -40,13 +43,14 @@ def _wired() -> Supersigma:
     return drive
 
 
-def _candidate(name: str, make: Callable[[], Supersigma], most: int = 40_000) -> Candidate:
-    return Candidate(name, make, FRAMES, INPUTS, "BUS", most_per_second=most)
+def _candidate(name: str, make: Callable[[], Supersigma]) -> Candidate:
+    return Candidate(name, make, frames(STEPS), INPUTS, "BUS")
 
 
 CANDIDATES = (
     _candidate("supersigma", lambda: Supersigma(number=NUMBER)),
     _candidate("supersigma, exact, no line timing", lambda: Supersigma(short=Way.EXACT, line_timing=False)),
     _candidate("supersigma, free, least offset", lambda: Supersigma(short=Way.FREE, offset=4, braking=100)),
-    _candidate("supersigma, pulses wired", _wired, most=120_000),
+    # every pulse is a deadline, and its end another
+    Candidate("supersigma, pulses wired", _wired, frames(FEW), INPUTS, "BUS", st.integers(0, 30 * MS), 60_000),
 )

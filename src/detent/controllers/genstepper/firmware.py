@@ -420,7 +420,7 @@ class GenStepper:
     def _keep(self, now: Ns) -> Sequence[str]:
         rate = _limited(self._value.number(), LEAST_KEPT)
         for motor in self._each():
-            motor.keep = rate
+            motor.set_keep(rate, now)
         return ()
 
     def _slope(self, now: Ns) -> Sequence[str]:

@@ -4,7 +4,6 @@ There are no frames: every character that is no part of a number is a command, a
 """
 
 from collections.abc import Sequence
-from enum import Enum
 
 LARGEST = 2_147_483_647  # "a range of -2,147,483,647 through 2,147,483,647"
 PROMPT = "*"
@@ -18,16 +17,10 @@ def saturated(number: int) -> int:
     return max(-LARGEST, min(LARGEST, number))
 
 
-class _Typing(Enum):
-    DONE = "done"  # the next digit begins a new number
-    SIGN = "sign"  # "set no value yet"
-    DIGITS = "digits"
-
-
 class Value:
     """The number that stands before a command, and stays for the commands behind it."""
 
-    __slots__ = ("_number", "_sign", "_typing")
+    __slots__ = ("_alone", "_number", "_sign", "_typing")
 
     def __init__(self) -> None:
         self.clear()
@@ -36,30 +29,30 @@ class Value:
         """As after a reset: 0."""
         self._number = 0
         self._sign = 1
-        self._typing = _Typing.DONE
+        self._typing = False  # the next digit belongs to this number
+        self._alone = False  # it is a sign alone: "set no value yet"
 
     def take(self, character: str) -> bool:
         """Take a digit or a sign; False for any other character."""
         if character in "+-":
-            self._number, self._sign, self._typing = 0, (1 if character == "+" else -1), _Typing.SIGN
+            self._number, self._sign, self._typing, self._alone = 0, (1 if character == "+" else -1), True, True
             return True
         if character not in "0123456789":
             return False
-        if self._typing is _Typing.DONE:
-            self._number, self._sign = 0, 1
-        self._typing = _Typing.DIGITS
+        if not self._typing:
+            self._number, self._sign, self._typing = 0, 1, True
+        self._alone = False
         self._number = saturated(self._number * 10 + int(character))
         return True
 
     def slew(self) -> int:
-        """The direction of a sign that stands alone, which S understands; 0 if there is a number."""
-        if self._typing is _Typing.SIGN:
-            return self._sign
-        return 0
+        """For S: the direction of a sign that stands alone; 0 if there is a number."""
+        self._typing = False
+        return self._sign if self._alone else 0
 
     def number(self) -> int:
-        """The number for a command other than a slew: a sign alone counts as 0. It is complete then."""
-        self._typing = _Typing.DONE
+        """For any other command: the number; a sign alone counts as 0, from now on."""
+        self._typing = self._alone = False
         return self._sign * self._number
 
 

@@ -187,6 +187,12 @@ class Motor:
         if self.action is Action.SLEWING:
             self._continue_slew(now)
 
+    def set_keep(self, keep: int, now: Ns) -> None:
+        """K: a stop under way ends there; a target move keeps the one that it began with."""
+        self.keep = keep
+        if self.action in (Action.STOPPING, Action.REVERSING, Action.TURNING):
+            self._stop_for(self.action, now)
+
     def set_slope(self, slope: int, now: Ns) -> None:
         """P: at once. A target move keeps the braking point that it computed (page 31)."""
         self.slope = slope

@@ -7,6 +7,8 @@ from detent.uart import Format, SerialPort
 
 CLOCK_LOW_NS = 1_700  # the step pulse (pin 28)
 RESET_LOW_NS = 400_000  # the reset pulse (pin 27)
+SUPPLY_V = (12.0, 40.0)  # pins 17 and 18
+LOADS_A = {"5V": 0.1, "+VSL": 0.01, "-VSL": 0.01}  # the most that pins 20-21, 16 and 15 give
 
 _IN, _STRAP, _OUT = PinKind.INPUT, PinKind.STRAP, PinKind.OUTPUT
 

@@ -50,9 +50,10 @@ class Link:
     def frame(self, text: str) -> bytes:
         """The message to this drive that `text` says: a command in words, or its bytes in hex. ValueError."""
         try:
-            return bytes([self.number]) + bytes.fromhex(text) if text.strip() else b""
+            raw = bytes.fromhex(text)
         except ValueError:
-            return commands.message(self.number, commands.read(text))
+            raw = b""
+        return bytes([self.number]) + raw if raw else commands.message(self.number, commands.read(text))
 
 
 def answer(steps: int, flags: int) -> bytes:
@@ -75,7 +76,7 @@ def answers(data: bytes) -> list[str]:
 def answered(text: str) -> bool:
     """Whether a drive answers the command that `text` says (see `Link.frame`)."""
     try:
-        command = commands.parse(Link(0).frame(text).ljust(commands.LONGEST, b"\0"))
+        command = commands.parse(Link(0).frame(text).ljust(commands.LONGEST, b"\0"))  # hex may be too short
     except ValueError:
         return False
     return command is not None and command.op is commands.Op.STATUS

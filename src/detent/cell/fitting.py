@@ -1,0 +1,89 @@
+"""Motors fitted to a cell: from ``[motors.NAME]`` and the switches on its axis to a `Mechanics`."""
+
+from collections.abc import Mapping, Sequence
+from math import inf
+
+from detent.cell.description import Description, Motor, Problem, Switch
+from detent.cell.mechanics import PINS, Contact, Detector, Mechanics
+from detent.motors.drive import Currents, Drive
+from detent.motors.fit import fitted
+from detent.motors.load import Load
+from detent.motors.motor import MotorError
+from detent.motors.named import motor as named
+from detent.motors.rotor import Rig
+from detent.motors.winding import winding
+
+HALF_A_STEP = 0.5
+
+
+def motors_by_axis(description: Description) -> dict[tuple[str, str], str]:
+    """Which motor sits on which axis (unit, axis). Raises Problem for a second one."""
+    found: dict[tuple[str, str], str] = {}
+    for name, entry in description.motors.items():
+        if entry.unit is None:
+            continue
+        other = found.setdefault((entry.unit, entry.axis), name)
+        if other != name:
+            what = f"{other} is on the axis of {entry.unit} already: a second motor needs a unit, or step pulses, of its own"
+            raise Problem(description.file, f"motors.{name}.unit", what)
+    return found
+
+
+def mechanics(description: Description, name: str, switches: Mapping[str, Switch], shaft: int, record: bool) -> Mechanics:
+    """The mechanics of the motor `name`, with the switches that its rotor moves. Raises Problem."""
+    entry = description.motors[name]
+    try:
+        rig = _rig(entry)
+        contacts = [_contact(switch, place, entry) for switch, place in switches.items()]
+        detector = Detector(entry.window)
+        return Mechanics(rig, axis=entry.axis, shaft=float(shaft), reverse=entry.reverse, contacts=contacts,
+                         detector=detector, record=record)  # fmt: skip
+    except MotorError as error:
+        raise Problem(description.file, f"motors.{name}", str(error)) from None
+
+
+def check_names(description: Description, taken: Sequence[str]) -> None:
+    """Raise Problem if a motor has a name that is something else's, or a switch has that of one of its pins."""
+    pins = {pin.name for pin in PINS}
+    for name in description.motors:
+        if name in taken:
+            raise Problem(description.file, f"motors.{name}", "a unit or switch has this name already: choose another")
+    for name, switch in description.switches.items():
+        if switch.axis is not None and name in pins:
+            raise Problem(description.file, f"switches.{name}", "a pin of every motor has this name: choose another")
+
+
+def _rig(entry: Motor) -> Rig:
+    found = fitted(entry.motor).motor if entry.fitted else named(entry.motor)
+    if entry.data:
+        found = found.changed(**entry.data)
+    load = Load(**entry.load)
+    current = entry.current
+    if isinstance(current, (int, float)):
+        amps, currents = float(current), Currents()
+    elif current is None:
+        amps, currents = found.current, Currents()
+    else:
+        amps = max(current.run, current.ramp)
+        if current.run:
+            currents = Currents(1.0, 1.0, current.hold / amps, max(current.after, 1))
+        else:
+            currents = Currents(current.ramp / amps, current.slew / amps, current.rest / amps)
+    return Rig(found, Drive(entry.supply, amps, winding(entry.step), entry.decay, entry.threshold, currents, entry.drop,
+                            entry.resistance), load)  # fmt: skip
+
+
+def _contact(name: str, entry: Switch, motor: Motor) -> Contact:
+    low, high = entry.range
+    if entry.axis == motor.unit:
+        # in whole steps, as without a motor: the rotor is at a step while it is nearer to it than to the next
+        ends = (-inf if low is None else low - HALF_A_STEP, inf if high is None else high + HALF_A_STEP)
+    else:
+        lead = motor.lead or 1.0
+        ends = (-inf if low is None else low / lead, inf if high is None else high / lead)
+        if ends[0] == ends[1]:
+            raise MotorError(f"switch {name} has no width: give from and to")
+        ends = min(ends), max(ends)
+    return Contact(name, *ends, entry.inside)
+
+

@@ -1,0 +1,355 @@
+"""The serial adapters SIN-8 and SIN-10: a host on one side, a party line on the other (manual, pages 18 to 20).
+
+They are devices of a cell. Towards the host they speak on TXD and hear on RXD, towards the axes on TX and RX, and
+they drive PARTY. What the manual leaves to the SIN-10's own guide is our assumption (E): see docs/controllers/dcb274.md.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from enum import Enum
+from typing import Any, Final
+
+from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind
+from detent.ticks import MS, NEVER, Ns
+from detent.uart import Char, Format, SerialPort, Transmitter
+
+LF, CR, ESC = 0x0A, 0x0D, 0x1B
+CTRL_C, CTRL_P = 0x03, 0x10
+BUFFER: Final = 256  # characters, each way
+NAMES: Final = bytes(value for value in range(0x21, 0x7F) if value not in b"[\\]^_`@")
+PATIENCE: Final[Ns] = 2 * MS  # for an echo, beside four characters
+RESTART: Final[Ns] = 5 * MS  # from ^P to the scan
+_ROOM: Final = 128  # characters that may wait for the host before another command begins
+
+PINS = (
+    Pin("RXD", None, PinKind.SERIAL, "from the host"),
+    Pin("TXD", None, PinKind.SERIAL, "to the host"),
+    Pin("RX", None, PinKind.SERIAL, "from the axes"),
+    Pin("TX", None, PinKind.SERIAL, "to the axes"),
+    Pin("SWITCH", None, PinKind.INPUT, "the switch: 1 = party line (P), 0 = single (S)"),
+    Pin("PARTY", 8, PinKind.OUTPUT, "party select of the axes"),
+)
+UPSTREAM = SerialPort("RXD", "TXD")
+DOWNSTREAM = SerialPort("RX", "TX")
+
+
+class Adapter:
+    """What both adapters are: a converter between two lines, and the driver of PARTY."""
+
+    pins: Sequence[Pin] = PINS
+    serial_port = UPSTREAM
+    downstream = DOWNSTREAM
+
+    def __init__(self, baud: int, line_baud: int, party: bool, line_timing: bool) -> None:
+        self.line_format, self.downstream_format = Format(baud), Format(line_baud)
+        self._timed = line_timing
+        self._party: Level = HIGH if party else LOW
+        self._powered = False
+        self._out: list[Any] = []
+        self._driver = PinDriver(self._out)
+        self._make_transmitters()
+
+    def _make_transmitters(self) -> None:
+        self._up = Transmitter(UPSTREAM.sends, self.line_format, self._out, timed=self._timed)
+        self._down = Transmitter(DOWNSTREAM.sends, self.downstream_format, self._out, timed=self._timed)
+
+    def power(self, on: bool, now: Ns) -> None:
+        """Switch the supply, which comes from the first axis."""
+        self._powered = on
+        self._make_transmitters()
+        if on:
+            self._driver.set("PARTY", self._party, now)
+        else:
+            self._driver.release()
+
+    def set_pin(self, pin: str, level: Level, now: Ns) -> None:
+        """The switch is moved; the axes look at PARTY when they are reset."""
+        self.advance(now)
+        self._party = level
+        if self._powered:
+            self._driver.set("PARTY", level, now)
+
+    def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
+        """Characters from the host or from the axes: passed on."""
+        self.advance(now)
+        if self._powered:
+            towards = self._down if port == UPSTREAM.receives else self._up
+            for char in chars:
+                towards.send(bytes((char.value,)), now)
+
+    def stored(self, ok: bool, now: Ns) -> None:
+        """It stores nothing."""
+
+    def next_deadline(self) -> Ns | None:
+        """When the next character goes out."""
+        deadline = min(self._up.deadline, self._down.deadline)
+        return None if deadline >= NEVER else deadline
+
+    def advance(self, now: Ns) -> None:
+        """Begin the characters that are due."""
+        self._up.advance(now)
+        self._down.advance(now)
+
+    def drain(self) -> list[Any]:
+        """What it sent, and PARTY."""
+        out = self._out.copy()
+        self._out.clear()
+        return out
+
+    def watch(self, pin: str) -> None:
+        """It gives no pulses."""
+
+    @property
+    def answering(self) -> bool:
+        """Whether an answer is still to come."""
+        return False
+
+    def frame(self, text: str) -> bytes:
+        """What a host sends: behind a plain converter, the characters as they are."""
+        return text.encode("latin-1", "replace")
+
+    def answers(self, data: bytes) -> list[str]:
+        """The lines that came from it."""
+        return [line for line in data.decode("latin-1").replace("\r", "\n").split("\n") if line]
+
+
+class Sin8(Adapter):
+    """The SIN-8: RS-232 to RS-422, and the switch for party or single line (page 18).
+
+    A converter passes a character on while it comes: the copy ends with the character itself.
+    """
+
+    def __init__(self, baud: int = 9600, party: bool = True, *, line_timing: bool = True) -> None:
+        super().__init__(baud, baud, party, line_timing)
+
+    def _make_transmitters(self) -> None:
+        self._up = Transmitter(UPSTREAM.sends, self.line_format, self._out, timed=False)
+        self._down = Transmitter(DOWNSTREAM.sends, self.downstream_format, self._out, timed=False)
+
+
+class Task(Enum):
+    """What an exchange with an axis is for."""
+
+    NONE = "none"
+    COMMAND = "command"
+    POLL = "is it moving"
+    SCAN = "is there an axis of this name"
+    RESTART = "after ^P"
+
+
+class Waiting(Enum):
+    """What the exchange waits for."""
+
+    NOTHING = "nothing"
+    ECHO = "the echo of a character"
+    END = "the line feed of the axis"
+
+
+class Sin10(Adapter):
+    """The SIN-10: does the handshake, polls, scans (page 19).
+
+    Line of commands separated by ``;``, ended by CR or LF; each is answered with one line. `&` first: it restarts
+    the axes in party line mode and answers their names. ``9W*`` and ``9Wn`` wait until all axes or one stand
+    still. ESC and ^C go through at once, and end everything.
+    """
+
+    def __init__(
+        self, baud: int = 9600, line_baud: int = 9600, party: bool = True, converter: bool = False, *,
+        line_timing: bool = True,
+    ) -> None:  # fmt: skip
+        super().__init__(baud, line_baud, party, line_timing)
+        self._converter = converter  # "the SIN-10 can be one"
+        self.names = b""  # of the axes that the scan has found
+        self._forget()
+
+    def _forget(self) -> None:
+        self._buffer = bytearray()  # from the host, as far as it has not been begun
+        self._lines = 0  # complete ones in it
+        self._task, self._waiting = Task.NONE, Waiting.NOTHING
+        self._to_send: deque[int] = deque()  # to the axis
+        self._expected = 0  # the echo
+        self._reply = bytearray()  # of the axis: echo and data
+        self._silent = False  # an echo did not come
+        self._axes: deque[int] = deque()  # still to be scanned, or to be waited for
+        self._command = ""  # that a wait answers
+        self._timer: Ns = NEVER
+        self._begin_at: Ns = NEVER  # when the host's line has room for another answer
+
+    def power(self, on: bool, now: Ns) -> None:
+        """Switch the supply."""
+        super().power(on, now)
+        self.names = b""
+        self._forget()
+
+    def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
+        """Characters from the host or from the axes."""
+        if self._converter:
+            super().receive(port, chars, now)
+            return
+        self.advance(now)
+        for char in chars:
+            if self._powered:
+                if port == UPSTREAM.receives:
+                    self._from_host(char.value, now)
+                else:
+                    self._from_axis(char.value, now)
+                self.advance(now)
+
+    def next_deadline(self) -> Ns | None:
+        """When a character goes out, or patience ends."""
+        deadline = self._next()
+        return None if deadline >= NEVER else deadline
+
+    def advance(self, now: Ns) -> None:
+        """Do what is due, in order of time."""
+        while (at := self._next()) <= now:
+            if self._timer <= at:
+                self._timer = NEVER
+                self._no_echo(at)
+            elif self._begin_at <= at:
+                self._begin_at = NEVER
+                self._begin(at)
+            else:
+                self._up.advance(at)
+                self._down.advance(at)
+
+    def _next(self) -> Ns:
+        return min(self._up.deadline, self._down.deadline, self._timer, self._begin_at)
+
+    @property
+    def answering(self) -> bool:
+        """Whether commands are in hand or wait."""
+        return self._task is not Task.NONE or self._lines > 0
+
+    def frame(self, text: str) -> bytes:
+        """A line of commands as a host sends it."""
+        return super().frame(text if self._converter else text + "\r")
+
+    # -- from the host -----------------------------------------------------------------------------------
+
+    def _from_host(self, value: int, now: Ns) -> None:
+        if value in (ESC, CTRL_C):
+            self._forget()
+            self._up.discard()
+            self._down.discard()
+            self._down.send(bytes((value,)), now)
+        elif value in (CR, LF):
+            if self._buffer and self._buffer[-1] != CR:
+                self._buffer.append(CR)
+                self._lines += 1
+                self._look(now)
+        elif len(self._buffer) < BUFFER:
+            self._buffer.append(value)
+
+    def _look(self, now: Ns) -> None:
+        """Begin the next command as soon as the host's line has room for its answer."""
+        if self._task is Task.NONE and self._lines:
+            self._begin_at = max(now, self._up.busy_until - self.line_format.duration(_ROOM) if self._timed else now)
+
+    def _begin(self, now: Ns) -> None:
+        end = next(i for i, value in enumerate(self._buffer) if value in b";\r")
+        command, separator = self._buffer[:end].decode("latin-1").strip(" "), self._buffer[end]
+        del self._buffer[: end + 1]
+        self._lines -= separator == CR
+        if command == "&":
+            self._down.send(bytes((CTRL_P,)), now)
+            self.names, self._axes = b"", deque(NAMES)
+            self._task, self._timer = Task.RESTART, max(now, self._down.busy_until) + RESTART
+        elif command[:2] == "9W" and len(command) == 3 and self._known(command[2]):
+            self._command = command
+            self._axes = deque(self.names if command[2] == "*" else command[2].encode("latin-1"))
+            self._poll(now)
+        elif command and command[0] != "*" and self._known(command[0]):
+            self._exchange(Task.COMMAND, command.encode("latin-1"), now)
+        elif command:
+            self._answer("#", now)
+        else:
+            self._look(now)
+
+    def _known(self, name: str) -> bool:
+        return bool(self.names) and (name == "*" or name.encode("latin-1") in self.names)
+
+    def _answer(self, text: str, now: Ns) -> None:
+        """One line to the host; then the next command."""
+        self._task, self._waiting = Task.NONE, Waiting.NOTHING
+        self._up.send(text.encode("latin-1") + b"\r\n", now)
+        self._look(now)
+
+    # -- exchanges with the axes -------------------------------------------------------------------------
+
+    def _exchange(self, task: Task, text: bytes, now: Ns) -> None:
+        self._task, self._silent = task, False
+        self._reply.clear()
+        self._to_send = deque(text)
+        self._send_next(now)
+
+    def _send_next(self, now: Ns) -> None:
+        """The next character, whose echo is awaited; behind the last one the line feed."""
+        if self._to_send:
+            self._expected = self._to_send.popleft()
+            self._waiting = Waiting.ECHO
+            self._down.send(bytes((self._expected,)), now)
+            self._wait_for_echo(now)
+        else:
+            self._waiting = Waiting.END
+            self._down.send(bytes((LF,)), now)
+
+    def _wait_for_echo(self, now: Ns) -> None:
+        characters = self.downstream_format.duration(4) if self._timed else 0
+        self._timer = now + characters + PATIENCE
+
+    def _from_axis(self, value: int, now: Ns) -> None:
+        match self._waiting:
+            case Waiting.ECHO if value == self._expected:
+                self._timer = NEVER
+                self._reply.append(value)
+                self._send_next(now)
+            case Waiting.END if value == LF:
+                self._timer = NEVER
+                self._done(now)
+            case Waiting.END:
+                self._reply.append(value)
+            case Waiting.NOTHING if self._task is Task.NONE:  # an answer to ESC
+                self._up.send(b"\r\n" if value == LF else bytes((value,)), now)
+
+    def _no_echo(self, now: Ns) -> None:
+        """Patience is over: with an echo, or with the end of a line that was broken off; or ^P has been obeyed."""
+        if self._task is Task.RESTART:
+            self._down.send(bytes((LF,)), now)
+            self._scan(now)
+        elif self._waiting is Waiting.ECHO:
+            self._silent = True
+            self._to_send.clear()
+            self._send_next(now)
+            self._wait_for_echo(now)
+        else:
+            self._done(now)
+
+    def _done(self, now: Ns) -> None:
+        """The line feed has come, or never will."""
+        self._waiting = Waiting.NOTHING
+        match self._task:
+            case Task.COMMAND:
+                self._answer(self._reply.decode("latin-1") + ("?" if self._silent and not self._reply else ""), now)
+            case Task.SCAN:
+                if self._reply:
+                    self.names += bytes((self._axes[0],))
+                self._axes.popleft()
+                self._scan(now)
+            case Task.POLL:
+                status = self._reply[2:].strip()
+                if not self._silent and status.isdigit() and int(status) & 3 == 0:
+                    self._axes.popleft()
+                self._poll(now)
+
+    def _scan(self, now: Ns) -> None:
+        if self._axes:
+            self._exchange(Task.SCAN, bytes((self._axes[0],)), now)
+        else:
+            self._answer(self.names.decode("latin-1"), now)
+
+    def _poll(self, now: Ns) -> None:
+        if self._axes:
+            self._exchange(Task.POLL, bytes((self._axes[0], ord("^"))), now)
+        else:
+            self._answer(self._command, now)

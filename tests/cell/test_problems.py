@@ -1,0 +1,179 @@
+"""What cannot be built: each fault is told with the file, the key and what to do."""
+
+import pytest
+
+from detent.cell.build import build
+from detent.cell.description import Problem, parse, single
+from tests.cell.cells import cell
+
+ONE = '[units.bar]\nmodel = "gs-c200"\n'
+TWO = ONE + '[units.drill]\nmodel = "gs-c200s"\n'
+WIRE = "[[wires]]\n"
+
+FAULTS = [
+    # form
+    ("units = ", "", "this is no TOML: "),
+    ("", "units", "this key is missing"),
+    ("[units]\n", "", "a cell needs at least one unit: [units.NAME] with model = 'gs-c200'"),
+    ("[units.bar]\n", "units.bar.model", "this key is missing"),
+    ('file = "x"\n' + ONE, "file", "there is no such key; remove it"),
+    (ONE + 'modle = "x"\n', "units.bar.modle", "there is no such key; did you mean model? there are: model, program"),
+    ("colour = 1\n" + ONE, "colour", "there is no such key; there are: title, units, wires, switches, lines, script"),
+    (ONE + "program = 5\n", "units.bar.program", "(it is 5)"),
+    (ONE + "[switches.a]\n", "switches.a.drives", "this key is missing"),
+    (ONE + '[switches.a]\ndrives = "bar.UI1"\nlevel = 2\n', "switches.a.level", "a level is 0, 1, low or high (it is 2)"),
+    (ONE + '[switches.a]\ndrives = "bar.UI1"\nlevel = true\n', "switches.a.level", "a level is 0, 1, low or high"),
+    (ONE + '[switches.a]\ndrives = "bar.UI1"\nfrom = 2\n', "switches.a", "name it with axis = 'UNIT'"),
+    (ONE + '[switches.a]\ndrives = "bar.UI1"\naxis = "bar"\n', "switches.a", "needs its place: at, or from and to"),
+    (ONE + '[switches.a]\ndrives = "bar.UI1"\naxis = "bar"\nat = 1\nto = 2\n', "switches.a", "either at, or from and to"),
+    (ONE + '[switches.a]\ndrives = "bar.UI1"\naxis = "bar"\nfrom = 3\nto = 2\n', "switches.a", "must not be greater"),
+    (ONE + "[[script]]\nat = 1\n", "script[1]", "nothing to do: give set, send or power"),
+    (ONE + "[[script]]\nat = -1\npower = {bar = true}\n", "script[1].at", "is no duration: write it like 1.5 s"),
+    (ONE + '[[script]]\nat = "3 parsecs"\npower = {bar = true}\n', "script[1].at", "is no duration"),
+    (ONE + '[[script]]\nat = true\npower = {bar = true}\n', "script[1].at", "write a time like 1.5 (seconds)"),
+    (ONE + '[[script]]\nset = {"bar.UI1" = 1}\n', "script[1].at", "this key is missing"),
+    # units
+    ('[units.bar]\nmodel = "gs-c300"\n', "units.bar.model", "no model 'gs-c300'; did you mean gs-c200"),
+    ('[units.bar]\nmodel = "GS-C200"\n', "units.bar.model", "did you mean gs-c200? there are: "),
+    (ONE + "straps = {CSH = 0}\n", "units.bar.straps", "no strap of the gs-c200 'CSH'; did you mean CHS?"),
+    (ONE + "straps = {CHS = 3}\n", "units.bar.straps", "strap CHS cannot be 3; it takes low (0), high (1) or open"),
+    (ONE + "straps = {TEST = 1}\n", "units.bar.straps", "pin 10 (TEST) of bar must be tied to ground"),
+    (ONE + "straps = {TXPD = 1}\n", "units.bar.straps", "TXPD must be tied to TXD on one unit of a line"),
+    (ONE + "options = {revison = 2.1}\n", "units.bar.options", "did you mean revision?"),
+    (ONE + 'options = {instruction_time = "0"}\n', "units.bar.options", "cannot be '0'; it takes a duration of at least 1 us"),
+    (ONE + 'options = {clock = "both"}\n', "units.bar.options", "it takes direction or separate"),
+    ('[units.bar]\nmodel = "gs-c200s"\noptions = {revision = 2.1}\n', "units.bar.options", "no option of the gs-c200s"),
+    (ONE + 'program = "gone.gsc"\n', "units.bar.program", "cannot read gone.gsc: No such file or directory"),
+    (ONE + 'eeprom = "gone.gsc"\n', "units.bar.eeprom", "cannot read gone.gsc"),
+    (ONE + 'program = "bad.gsc"\n', "units.bar.program", "A9"),
+    (ONE + 'program = "long.gsc"\n', "units.bar.program", "119"),
+    ('[units.d]\nmodel = "step-detector"\nprogram = "ok.gsc"\n', "units.d.program", "holds no program: remove it"),
+    ('[units.d]\nmodel = "step-detector"\noptions = {response = "x"}\n', "units.d.options", "it takes a duration"),
+    ('[units.d]\nmodel = "step-detector"\nstraps = {CHS = 0}\n', "units.d.straps", "no strap of the step-detector"),
+    # wires
+    (TWO + WIRE + 'from = "bar"\nto = "drill.UI1"\n', "wires[1].from", "'bar' names no pin: write UNIT.PIN"),
+    (TWO + WIRE + 'from = "bra.UO1"\nto = "drill.UI1"\n', "wires[1].from", "no unit 'bra'; did you mean bar?"),
+    (TWO + WIRE + 'from = "bar.UO1"\nto = "moon.UI1"\n', "wires[1].to", "no unit 'moon'; there are: bar, drill"),
+    (TWO + WIRE + 'from = "bar.UO1"\nto = "drill.UI9"\n', "wires[1].to", "that takes a wire 'UI9'; did you mean UI"),
+    (TWO + WIRE + 'from = "bar.UI1"\nto = "drill.UI1"\n', "wires[1].from", "bar.UI1 is no output: a wire starts at one"),
+    (TWO + WIRE + 'from = "bar.TXD"\nto = "drill.RXD"\n', "wires[1].from", "'TXD'"),
+    (TWO + WIRE + 'from = "bar.UO1"\nto = "bar.UO1"\n', "wires[1].to", "bar.UO1 is wired to itself: remove the wire"),
+    (TWO + WIRE + 'from = "bar.UO1"\nto = "drill.UO1"\n', "wires", "bar.UO1 and drill.UO1 drive the same wire"),
+    (
+        TWO + WIRE + 'from = "bar.UO1"\nto = "drill.UI1"\n' + WIRE + 'from = "drill.UO2"\nto = "drill.UI1"\n',
+        "wires", "bar.UO1 and drill.UO2 drive the same wire: only open collectors may share one",
+    ),
+    (TWO + WIRE + 'from = "bar.RDY"\nto = "drill.UO1"\n', "wires", "drive the same wire"),
+    (
+        ONE + '[switches.a]\ndrives = "bar.UI1"\n[switches.b]\ndrives = "bar.UI1"\n',
+        "wires", "a and b drive the same wire",
+    ),
+    # switches
+    (ONE + '[switches.bar]\ndrives = "bar.UI1"\n', "switches.bar", "a unit has this name already: choose another"),
+    (ONE + '[switches.a]\ndrives = "bar.UX1"\n', "switches.a.drives", "'UX1'; did you mean UI1"),
+    (ONE + '[switches.a]\ndrives = "bar.UI1"\naxis = "baz"\nat = 1\n', "switches.a.axis", "no unit 'baz'"),
+    (
+        '[units.d]\nmodel = "step-detector"\n[switches.a]\ndrives = "d.CLOCK"\naxis = "d"\nat = 1\n',
+        "switches.a.axis", "d moves no axis: name a controller",
+    ),
+    # lines
+    (ONE + "[lines.one]\nunits = []\n", "lines.one.units", "a line needs at least one unit"),
+    (ONE + '[lines.one]\nunits = ["baz"]\n', "lines.one.units", "no unit 'baz'; did you mean bar?"),
+    (TWO + '[lines.one]\nunits = ["bar", "drill"]\n', "lines.one.units", "is strapped point to point: give it an address"),
+    (ONE + '[lines.one]\nunits = "bar"\n[lines.two]\nunits = "bar"\n', "lines.two.units", "bar is on line one already"),
+    (
+        '[units.a]\nmodel = "gs-c200"\nstraps = {SEL0 = 0}\n[units.b]\nmodel = "gs-c200"\nstraps = {SEL0 = 0}\n'
+        '[lines.one]\nunits = ["a", "b"]\n',
+        "lines.one.units", "a and b both have address 4: change SEL0-SEL2 of one of them",
+    ),
+    (
+        '[units.a]\nmodel = "gs-c200"\nstraps = {SEL0 = 0}\n[units.b]\nmodel = "gs-c200"\nstraps = {SEL1 = 0, BR0 = 1}\n'
+        '[lines.one]\nunits = ["a", "b"]\n',
+        "units.b.straps", "a is strapped for 9600 7O2, b for 4800 7O2: units on one line need the same",
+    ),
+    (
+        '[units.a]\nmodel = "gs-c200"\nstraps = {SEL0 = 0, TXPD = 0}\n'
+        '[units.b]\nmodel = "gs-c200"\nstraps = {SEL1 = 0, TXPD = 0}\n[lines.one]\nunits = ["a", "b"]\n',
+        "lines.one.units", "units a and b have it tied; set TXPD = low on b only",
+    ),
+    (ONE + '[units.d]\nmodel = "step-detector"\n[lines.x]\nunits = "d"\n', "lines.x.units", "d has no serial port"),
+    # script
+    (ONE + "[[script]]\nat = 1\nset = {start = 1}\n", "script[1].set", "no switch 'start'; there are: UNIT.PIN"),
+    (ONE + "[[script]]\nat = 1\nset = {bar = 1}\n", "script[1].set", "bar is a unit: write bar.PIN"),
+    (ONE + '[[script]]\nat = 1\nset = {"bar.UO1" = 1}\n', "script[1].set", "bar.UO1 is an output: the unit sets it"),
+    (ONE + '[[script]]\nat = 1\nset = {"bar.UI1" = 7}\n', "script[1].set.bar.UI1", "a level is 0, 1, low or high"),
+    (
+        ONE + '[switches.a]\ndrives = "bar.UI1"\n[[script]]\nat = 1\nset = {"bar.UI1" = 1}\n',
+        "script[1].set", "a drives bar.UI1: set that instead, or cut the wire",
+    ),
+    (ONE + "[[script]]\nat = 1\npower = {baz = true}\n", "script[1].power", "no unit 'baz'; did you mean bar?"),
+    (ONE + '[[script]]\nat = 1\nsend = "F"\n', "script[1].to", "say which unit the line is for: to = 'UNIT'"),
+    (ONE + '[[script]]\nat = 1\nsend = "F"\nto = "baz"\n', "script[1].to", "no unit 'baz'"),
+    (
+        TWO + '[lines.one]\nunits = "bar"\n[[script]]\nat = 1\nsend = "F"\nto = "drill"\n',
+        "script[1].to", "drill is on no line: put it on one in [lines]",
+    ),
+]  # fmt: skip
+
+FILES = {"bad.gsc": "A9\n", "long.gsc": "+1\n" * 30, "ok.gsc": "A1\n"}
+
+
+@pytest.mark.parametrize(("text", "key", "message"), FAULTS, ids=[f"{n}-{key}" for n, (_, key, _) in enumerate(FAULTS)])
+def test_a_fault_is_told_with_its_file_its_key_and_the_remedy(text: str, key: str, message: str) -> None:
+    with pytest.raises(Problem) as caught:
+        cell(text, FILES)
+    problem = caught.value
+    assert problem.file == "cell.toml"
+    assert problem.key == key
+    assert message in problem.message
+    assert str(problem) == ": ".join(part for part in ("cell.toml", key, problem.message) if part)
+    assert "\n" not in str(problem)
+
+
+def test_several_faults_of_form_are_told_in_one_line() -> None:
+    with pytest.raises(Problem) as caught:
+        cell(ONE + "colour = 1\n[[script]]\nat = 'x'\nset = {a = 1}\n[[wires]]\nto = 'x'\n")
+    assert str(caught.value).count("; ") >= 2
+    many = ONE + "".join(f"key{n} = 1\n" for n in range(9))
+    with pytest.raises(Problem, match="and 4 more$"):
+        cell(many)
+
+
+def test_a_damaged_image_is_told() -> None:
+    with pytest.raises(Problem, match=r"units\.bar: its stored image is damaged: byte 0 holds 00h"):
+        cell(ONE, images={"bar": b"\0"})
+
+
+def test_a_cell_of_one_unit_has_no_file() -> None:
+    made = build(single("gs-c200", straps={"CHS": 0}), lambda name: "")
+    assert list(made.controllers()) == ["gs-c200"]
+    with pytest.raises(Problem, match=r"^units\.gs-c300\.model: no model"):
+        build(single("gs-c300"), lambda name: "")
+
+
+def test_levels_times_and_names_may_be_written_in_several_ways() -> None:
+    described = parse(
+        ONE
+        + '[switches.a]\ndrives = "bar.UI1"\nlevel = "low"\n[switches.b]\ndrives = ["bar.UI2", "bar.UI3"]\nlevel = 1\n'
+        + '[[script]]\nat = "400 us"\nset = {a = "high"}\n[[script]]\nat = 2\nset = {a = 0}\n',
+        "x",
+    )
+    assert described.switches["a"].level == 0
+    assert described.switches["a"].drives == ["bar.UI1"]
+    assert [entry.at for entry in described.script] == [400_000, 2_000_000_000]
+
+
+def test_line_faults_do_not_need_lines_for_every_unit() -> None:
+    made = cell(TWO + '[lines.one]\nunits = "bar"\n')
+    assert len(made.lines) == 1
+    with pytest.raises(ValueError, match="is on no line"):
+        made.type("drill", "F")
+    with pytest.raises(KeyError, match="no unit 'moon'"):
+        made.type("moon", "F")
+
+
+def test_a_part_is_no_controller() -> None:
+    made = cell(ONE + '[units.d]\nmodel = "step-detector"\n')
+    with pytest.raises(TypeError, match="'d' is not a controller"):
+        made.controller("d")
+    assert list(made.controllers()) == ["bar"]
