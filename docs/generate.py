@@ -22,7 +22,12 @@ from detent.controllers.gsc200 import commands, pins, program
 from detent.controllers.gsc200.commands import GS_C200, GS_C200S, Instruction, Op, Row
 from detent.controllers.gsc200.link import LONGEST
 from detent.controllers.gsc200.motion import Motion
+from detent.controllers.supersigma import link as supersigma_link
+from detent.controllers.supersigma.program import OFFSET
 from detent.pins import LOW, PinDriver
+from detent.ramps.differences import PAPER
+from detent.ramps.rate_generator import CLOCK_HZ
+from detent.ramps.short_movements import Way, choose, movement
 from detent.ticks import show_duration
 
 DOCS: Final = Path(__file__).parent
@@ -272,6 +277,34 @@ def cell_parts() -> str:
     return "\n".join(text)
 
 
+# -- of the SUPERSIGMA drive ---------------------------------------------------------------------------------
+
+
+def drive_section(title: str) -> str:
+    """A table of the drive without its heading."""
+    return section("supersigma", title).partition("\n")[2]
+
+
+def flags() -> str:
+    """The bits of the third byte of an answer."""
+    rows = ((f"`{flag.bit:02X}h`", flag.word, flag.help) for flag in supersigma_link.FLAGS)
+    return table(("bit", "word", "what"), rows)
+
+
+def movement_times() -> str:
+    """What movements of some lengths take, by each way."""
+    entries, rows = len(PAPER.differences), []
+    for steps in (100, 200, 403, 404, 600, 1000, 1500, 2000, 3000, 4000, 5000, 5143, 5144, 6000):
+        row: list[object] = [steps]
+        for way in Way:
+            ramp = choose(PAPER, steps, OFFSET, way, entries)
+            clocks = movement(PAPER, steps, OFFSET, way, entries).clocks
+            chosen = ramp.entries if way is Way.FREE else ramp.first
+            row.append(f"{clocks * 1e3 / CLOCK_HZ:.1f} ms ({chosen})" if ramp.entries else "constant")
+        rows.append([*row, f"{steps * (PAPER.first + 1) * 1e3 / CLOCK_HZ:.1f} ms"])
+    return table(("half steps", "hyperbola (N0)", "exact (N0)", "free (entries)", "constant low speed"), rows)
+
+
 PARTS: Final[dict[str, Callable[[], str]]] = {
     "addresses": addresses,
     "baud rates": rates,
@@ -286,6 +319,11 @@ PARTS: Final[dict[str, Callable[[], str]]] = {
     "commands of the GS-C200S": lambda: section(GS_C200S, "Commands"),
     "image bytes": image_bytes,
     "parts of a cell": cell_parts,
+    "pins of the drive": lambda: drive_section("Pins"),
+    "options of the drive": lambda: drive_section("Options"),
+    "op-codes of the drive": lambda: drive_section("Commands"),
+    "flags of the drive": flags,
+    "times of the drive": movement_times,
 }
 
 if __name__ == "__main__":

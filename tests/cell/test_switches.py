@@ -2,6 +2,7 @@
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.cell.cells import cell, edges, places
 
 from detent.axis import Axis
 from detent.cell.recording import InputSet
@@ -9,7 +10,6 @@ from detent.cell.switches import AxisSwitch, Switch
 from detent.pins import PinSet
 from detent.pulses import Train, Uniform
 from detent.ticks import MS, SECOND, to_fixed
-from tests.cell.cells import cell, edges, places
 
 PROBED = """
 [units.unit]
@@ -49,11 +49,11 @@ def test_an_axis_switch_changes_at_the_pulse_that_crosses_its_edge() -> None:
     made = probed("from = 3\nto = 5")
     made.type("unit", "+9")
     made.run_to(1 * SECOND)
-    times = dict((place, at) for at, place in places(made, "unit"))
+    times = {place: at for at, place in places(made, "unit")}
     assert seen(made) == [(times[3], 0), (times[6], 1)]
     made.type("unit", "-9")
     made.run_to(2 * SECOND)
-    times = dict((place, at) for at, place in places(made, "unit")[9:])
+    times = {place: at for at, place in places(made, "unit")[9:]}
     assert seen(made)[2:] == [(times[5], 0), (times[2], 1)]
 
 
@@ -62,7 +62,7 @@ def test_at_is_one_step_wide_and_inside_may_be_1() -> None:
     assert seen(made) == [(0, 0)]
     made.type("unit", "+9")
     made.run_to(1 * SECOND)
-    times = dict((place, at) for at, place in places(made, "unit"))
+    times = {place: at for at, place in places(made, "unit")}
     assert seen(made)[1:] == [(times[4], 1), (times[5], 0)]
 
 
@@ -169,13 +169,14 @@ def test_a_switch_with_another_axis_does_not_follow() -> None:
 EVENTS = st.lists(
     st.tuples(
         st.integers(0, 60 * MS) | st.sampled_from([0, 1 * MS]),
-        st.sampled_from(["+7", "-5", "+30", "-30", "g+", "g-", "K", "Z", "low", "high", "off", "on", "H+", "H-"]),
+        st.sampled_from(["+7", "-5", "+30", "-30", "g+", "g-", "K", "Z", "off", "on", "H+", "H-"])
+        | st.sampled_from(["+30", "-30", "low", "high"]),
     ),
     max_size=14,
 )
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
 @given(
     EVENTS,
     st.none() | st.integers(-12, 12),
@@ -190,9 +191,8 @@ def test_an_axis_switch_is_where_the_pulses_say(
     high = None if width is None else (low or 0) + width
     if low is None and high is None:
         low = 0
-    where = "\n".join(
-        [f"inside = {inside}", *([f"from = {low}"] if low is not None else []), *([f"to = {high}"] if high is not None else [])]
-    )
+    ends = {"from": low, "to": high}
+    where = "\n".join([f"inside = {inside}", *(f"{key} = {end}" for key, end in ends.items() if end is not None)])
     made = probed(where, shaft)
     made.type("unit", "S20")
     for gap, what in events:

@@ -5,17 +5,19 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.controllers import conformance
 from tests.controllers.conformance import Candidate, schedules
+from tests.controllers.genstepper import inputs as genstepper
 from tests.controllers.gsc200 import inputs
 from tests.controllers.supersigma import inputs as supersigma
 
 from detent.cell.detector import StepDetector
 from detent.cell.switches import Switch
 
-CANDIDATES = (*inputs.CANDIDATES, *supersigma.CANDIDATES, Candidate("step detector", StepDetector, None, ["CLOCK"]),
+CANDIDATES = (*inputs.CANDIDATES, *genstepper.CANDIDATES, *supersigma.CANDIDATES,
+              Candidate("step detector", StepDetector, None, ["CLOCK"]),
               Candidate("switch", lambda: Switch(1), None, ["SET"]))  # fmt: skip
 
 FAST = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
-THOROUGH = settings(max_examples=1500, deadline=None, suppress_health_check=list(HealthCheck))
+THOROUGH = settings(max_examples=700, deadline=None, suppress_health_check=list(HealthCheck))
 
 every_candidate = pytest.mark.parametrize("candidate", CANDIDATES, ids=[candidate.name for candidate in CANDIDATES])
 

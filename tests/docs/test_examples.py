@@ -1,5 +1,6 @@
 """Every cell of `examples/`, run, with what its comments promise."""
 
+import runpy
 from itertools import pairwise
 from pathlib import Path
 
@@ -8,6 +9,8 @@ import pytest
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import parse
+from detent.cell.host import HostPort
+from detent.hosts.ccu import Ccu
 from detent.outputs.signals import UnitSignals, of_cell
 from detent.ticks import MS, SECOND, Ns
 
@@ -45,7 +48,7 @@ def pulses(cell: Cell, unit: str) -> list[Ns]:
 
 
 def test_no_example_is_without_a_test() -> None:
-    tested = {"closed-loop", "drilling", "homing", "menu", "multipoint", "synchronised", "velocity"}
+    tested = {"assembly", "closed-loop", "drilling", "homing", "menu", "multipoint", "synchronised", "velocity"}
     assert {path.parent.name for path in EXAMPLES.glob("*/cell.toml")} == tested
 
 
@@ -125,3 +128,32 @@ def test_the_belt_stops_one_ramp_behind_each_mark() -> None:
         assert stopped == belt.position(at + 200 * MS)
         assert stopped - belt.position(at) == 1 + 40  # the pulse that keeps its time, and R
     assert positions(cell) == {"belt": belt.position(cell.now)}
+
+
+class TestAssembly:
+    @pytest.fixture(scope="class")
+    def assembled(self) -> Cell:
+        cell = example("assembly")
+        port = HostPort(cell)
+        script = runpy.run_path(str(EXAMPLES / "assembly" / "pick_and_place.py"))
+        script["pick_and_place"](Ccu(port, port.wait), port.wait)
+        return cell
+
+    def test_the_seven_drives_of_the_robot_find_their_origins_and_come_home_again(self, assembled: Cell) -> None:
+        assert len(positions(assembled)) == 7
+        assert set(positions(assembled).values()) == {0}
+        ccu = Ccu(HostPort(assembled), float)
+        assert all(ccu.status(drive).flags == 8 for drive in range(1, 8))  # originated, and nothing else
+
+    def test_the_bearing_goes_on_a_straight_line_beside_which_no_axis_is_by_a_step(self, assembled: Cell) -> None:
+        axes = [seen(assembled, f"left-{axis}") for axis in "xyz"]
+        x, y, z = (axis.pulses(0, assembled.now + 1) for axis in axes)
+        origin = 1  # the half step at which the switches open
+        begin = int(x.times[x.positions == origin + 6000 - 1][-1])  # the first pulse of the line, from 6000 to 5400
+        end = int(x.times[x.positions == origin + 5400][-1])
+        for axis, start, distance in ((y, 3750, 250), (z, 0, 200)):
+            inside = (axis.times >= begin) & (axis.times <= end)
+            for t, position in zip(axis.times[inside].tolist(), axis.positions[inside].tolist(), strict=True):
+                gone = origin + 6000 - float(x.positions[x.times <= t][-1])
+                slope = distance / 600
+                assert abs(position - origin - start - gone * slope) < 1 + slope

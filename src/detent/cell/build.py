@@ -3,7 +3,7 @@
 Whatever cannot be built is a `Problem` with the key and the remedy, and nothing is built.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
@@ -17,8 +17,11 @@ from detent.cell.switches import AxisSwitch, Switch
 from detent.controllers import catalogue
 from detent.controllers.catalogue import NO_LIMITS, CatalogueError, Model
 from detent.controllers.device import Controller, Device
+from detent.lines.daisy_chain import DaisyChain
 from detent.lines.line import Line
 from detent.lines.microbus import Microbus
+from detent.lines.party_line import PartyLine
+from detent.lines.sin import Adapter
 from detent.pins import HIGH, Level, Net, Pin, PinKind
 from detent.ticks import SECOND, round_ratio
 
@@ -79,7 +82,7 @@ class _Builder:
         actions = [action for n, entry in enumerate(self.description.script, 1) for action in self.actions(n, entry)]
         self.check_nets()
         cell = Cell(self.wiring(lines), self.parts, [Net() for _ in self.nets],
-                    [self.line(units, line_timing) for units in lines.values()],
+                    [self.line(name, units, line_timing) for name, units in lines.items()],
                     [*actions, *journal], store=store, record=record)  # fmt: skip
         self.switch_on(cell, images)
         cell.journaling = record
@@ -100,7 +103,7 @@ class _Builder:
             if isinstance(found, Model):
                 device: Device = found.make(straps[name], line_timing=line_timing, shaft=unit.shaft, **keywords)
             else:
-                device = found.make(**keywords)
+                device = found.make(**keywords, **({"line_timing": line_timing} if found.adapter else {}))
             self.names.append(name)
             self.parts.append(device)
 
@@ -134,9 +137,19 @@ class _Builder:
         alone = {name: [name] for name, found in self.models.items() if isinstance(found, Model)}
         for line, units in {**{n: u for n, u in alone.items() if n not in on_lines}, **lines}.items():
             found = self.models[units[0]]
-            assert isinstance(found, Model)
+            if isinstance(found, Part):
+                if len(units) > 1:
+                    raise self.problem(f"lines.{line}.units", f"{units[0]} has the line to its host for itself")
+                continue
+            described = self.description.lines.get(line)
+            if described is not None and described.host is not None:
+                for unit in units:  # the wire of party select is high until the adapter pulls it low
+                    named[unit] = ({"PARTY": HIGH} if "PARTY" in found.straps else {}) | named[unit]
+            # the links of a daisy chain are lines of one unit each
+            shared = [[unit] for unit in units] if described is not None and described.kind else [units]
             try:
-                named.update(zip(units, found.strap_line([(unit, named[unit]) for unit in units]), strict=True))
+                for each in shared:
+                    named.update(zip(each, found.strap_line([(unit, named[unit]) for unit in each]), strict=True))
             except ValueError as error:
                 key = f"lines.{line}.units" if line in self.description.lines else f"units.{units[0]}.straps"
                 raise self.problem(key, str(error)) from None
@@ -163,30 +176,69 @@ class _Builder:
                 raise self.problem(f"lines.{line}.units", "a line needs at least one unit")
             for unit in entry.units:
                 self.need_unit(f"lines.{line}.units", unit)
-                if described.units[unit].model in PARTS:
+                part = PARTS.get(described.units[unit].model)
+                if part is not None and not part.adapter:
                     raise self.problem(f"lines.{line}.units", f"{unit} has no serial port: remove it")
                 if unit in seen:
                     raise self.problem(f"lines.{line}.units", f"{unit} is on line {seen[unit]} already: choose one")
                 seen[unit] = line
+            if entry.host is not None:
+                self.check_host(line, entry.host)
         return {line: list(entry.units) for line, entry in described.lines.items()}
 
-    def line(self, units: list[str], timed: bool) -> Line:
+    def check_host(self, line: str, host: str) -> None:
+        """The host of a line is an adapter that is the host of no other, and has a line to its own host."""
+        key, described = f"lines.{line}.host", self.description
+        self.need_unit(key, host)
+        part = PARTS.get(described.units[host].model)
+        if part is None or not part.adapter:
+            adapters = ", ".join(name for name, part in PARTS.items() if part.adapter)
+            raise self.problem(key, f"{host} is no adapter: a line is hosted by one of {adapters}")
+        others = [name for name, entry in described.lines.items() if entry.host == host and name != line]
+        if others:
+            raise self.problem(key, f"{host} is the host of line {others[0]} already: choose one")
+        if not any(host in entry.units for entry in described.lines.values()):
+            raise self.problem(key, f"{host} has no line to its own host: add one with units = ['{host}']")
+
+    def adapter(self, line: str) -> tuple[str, Adapter] | None:
+        """The adapter that is the host of a line."""
+        entry = self.description.lines.get(line)
+        if entry is None or entry.host is None:
+            return None
+        device = self.parts[self.names.index(entry.host)]
+        assert isinstance(device, Adapter)
+        return entry.host, device
+
+    def line(self, name: str, units: list[str], timed: bool) -> Line:
         """The line itself; all its units have the same character format."""
+        kind = LINES[self.line_kind(units)]
         forms = {unit: self.controller(unit).line_format for unit in units}
         first = forms[units[0]]
         for unit, form in forms.items():
             if form != first:
                 what = f"{units[0]} is strapped for {first}, {unit} for {form}: units on one line need the same"
                 raise self.problem(f"units.{unit}.straps", what)
+        entry = self.description.lines.get(name)
+        if entry is not None and entry.kind:
+            return DaisyChain(first, len(units), timed=timed)
+        if (hosted := self.adapter(name)) is not None:
+            host, adapter = hosted
+            if adapter.downstream_format != first:
+                what = f"{host} speaks {adapter.downstream_format} to the line, its units {first}: set the same"
+                raise self.problem(f"units.{host}.options", what)
+            return PartyLine(first, len(units), timed=timed)
+        if isinstance(self.models[units[0]], Part):
+            return Line(first, timed=timed)
         port = self.controller(units[0]).serial_port
         early = round_ratio(SECOND * port.early.numerator, first.baud * port.early.denominator)
-        kind = LINES[self.line_kind(units)]
         return kind(first, timed=timed, early=early, start_bits=port.start_bits)
 
     def line_kind(self, units: list[str]) -> str:
-        """The kind of line that all these units sit on, each told apart from the others."""
+        """The kind of line that these units sit on, each told apart from the others."""
         models = {unit: found for unit in units if isinstance(found := self.models[unit], Model)}
-        first = models[units[0]]
+        if not models:
+            return "serial"
+        first = next(iter(models.values()))
         owners: dict[object, str] = {}
         for unit, found in models.items():
             if found.line != first.line:
@@ -238,12 +290,10 @@ class _Builder:
             if entry.axis is not None:
                 if any(place is not None and place != int(place) for place in entry.range):
                     raise self.problem(f"switches.{name}", "places on an axis without a motor are whole steps")
-                self.need_unit(f"switches.{name}.axis", entry.axis)
-                if entry.axis not in self.axis_units():
-                    raise self.problem(f"switches.{name}.axis", f"{entry.axis} moves no axis: name a controller")
+                unit, axis = self.axis_of(f"switches.{name}.axis", entry.axis)
                 low, high = (None if place is None else int(place) for place in entry.range)
-                switch = AxisSwitch(low, high, entry.inside, self.description.units[entry.axis].shaft)
-                self.axes[len(self.parts)] = self.names.index(entry.axis)
+                switch = AxisSwitch(low, high, entry.inside, self.description.units[unit].shaft, axis)
+                self.axes[len(self.parts)] = self.names.index(unit)
             self.names.append(name)
             self.parts.append(switch)
 
@@ -258,6 +308,13 @@ class _Builder:
                 contact = _End(self.names.index(name), Switch.pins[0], name)
             for target in entry.drives:
                 self.join(key, contact, self.end(key, target))
+        for line, entry_of_line in self.description.lines.items():
+            if entry_of_line.host is not None:  # the cable has a wire for party select
+                key = f"lines.{line}.host"
+                select = self.end(key, f"{entry_of_line.host}.PARTY")
+                for unit in entry_of_line.units:
+                    if any(pin.name == "PARTY" for pin in self.parts[self.names.index(unit)].pins):
+                        self.join(key, select, self.end(key, f"{unit}.PARTY"))
         for n, wire in enumerate(self.description.wires, 1):
             source = self.end(f"wires[{n}].from", wire.source)
             if not source.pin.kind.drives:
@@ -302,7 +359,7 @@ class _Builder:
         """One push-pull output at most on a net, and then nothing else that pulls."""
         for ends in self.nets:
             drivers = [end for end in ends if end.pin.kind.drives]
-            if len(drivers) > 1 and any(end.pin.kind is PinKind.OUTPUT for end in drivers):
+            if len(drivers) > 1 and any(end.pin.kind is not PinKind.OPEN_COLLECTOR for end in drivers):
                 pins = " and ".join(end.text for end in drivers)
                 raise self.problem("wires", f"{pins} drive the same wire: only open collectors may share one")
 
@@ -330,9 +387,14 @@ class _Builder:
         for line, names in enumerate(lines.values()):
             ports = [(self.names.index(name), self.controller(name).serial_port) for name in names]
             hears.append(tuple((unit, port.receives) for unit, port in ports))
+            hosted = self.adapter(list(lines)[line])
             for place, (unit, port) in enumerate(ports):
                 speaks[unit][port.sends] = line, place
-                line_of[unit] = line
+                line_of[unit] = -1 if hosted is not None else line
+            if hosted is not None:
+                host, port = self.names.index(hosted[0]), hosted[1].downstream
+                hears[-1] += ((host, port.receives),)
+                speaks[host][port.sends] = line, len(ports)
         return Wiring(tuple(self.names), units, tuple(drives), tuple(reads), tuple(followers),
                       tuple(hears), tuple(lines), tuple(line_of), tuple(speaks))  # fmt: skip
 
@@ -352,8 +414,12 @@ class _Builder:
             if entry.to is None:
                 raise self.problem(f"{key}.to", "say which unit the line is for: to = 'UNIT'")
             self.need_unit(f"{key}.to", entry.to)
-            if entry.to not in {unit for units in self.line_units().values() for unit in units}:
+            line = next((line for line, units in self.line_units().items() if entry.to in units), None)
+            if line is None:
                 raise self.problem(f"{key}.to", f"{entry.to} is on no line: put it on one in [lines]")
+            if line in self.description.lines and self.description.lines[line].host is not None:
+                host = self.description.lines[line].host
+                raise self.problem(f"{key}.to", f"{entry.to} is behind {host}: send to {host}")
             for text in entry.send:
                 try:
                     self.controller(entry.to).frame(text)
@@ -397,8 +463,9 @@ class _Builder:
                     self.controller(name).restore(image)
                 except ImageError as error:
                     raise self.problem(f"units.{name}", f"its stored image is damaged: {error}") from None
-        for name, unit in units.items():
-            if unit.powered:
+        hosts = [entry.host for entry in self.description.lines.values() if entry.host is not None]
+        for name in (*hosts, *(name for name in units if name not in hosts)):  # axes look at PARTY at power-on
+            if units[name].powered:
                 cell.power(name, True)
         for name, assembly in programs.items():
             self.controller(name).load(assembly.image, assembly.base, cell.now)
@@ -420,12 +487,29 @@ class _Builder:
 
     # -- names -------------------------------------------------------------------------------------------
 
+    def axis_of(self, key: str, text: str) -> tuple[str, str]:
+        """The unit and the axis that ``UNIT``, or ``UNIT.AXIS`` where a unit has several, names."""
+        unit, _, axis = text.partition(".")
+        self.need_unit(key, unit)
+        if unit not in self.axis_units():
+            raise self.problem(key, f"{unit} moves no axis: name a controller")
+        axes = self.controller(unit).axes
+        if axis not in axes:
+            if axis or len(axes) == 1:
+                raise self.problem(key, f"{unit} has no axis {axis!r}: write {self.written(unit, axes)}")
+            raise self.problem(key, f"{unit} has several axes: write {self.written(unit, axes)}")
+        return unit, axis
+
+    def written(self, unit: str, axes: Sequence[str]) -> str:
+        """How the axes of a unit are written."""
+        return " or ".join(f"{unit}.{axis}" if axis else unit for axis in axes)
+
     def axis_units(self) -> list[str]:
         return [name for name, found in self.models.items() if isinstance(found, Model)]
 
     def controller(self, name: str) -> Controller:
         device = self.parts[self.names.index(name)]
-        assert isinstance(self.models[name], Model)
+        assert isinstance(self.models[name], Model) or isinstance(device, Adapter)
         return device  # type: ignore[return-value]
 
     def need_unit(self, key: str, name: str) -> None:

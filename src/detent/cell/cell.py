@@ -37,6 +37,16 @@ class Follower(Protocol):
         """The axis does this."""
 
 
+class Talker(Protocol):
+    """A unit as its host sees it: a controller, or an adapter in front of others."""
+
+    def frame(self, text: str) -> bytes:
+        """The bytes a host sends for a command line."""
+
+    def answers(self, data: bytes) -> list[str]:
+        """What a host reads in the bytes that came back."""
+
+
 class Wiring(NamedTuple):
     """What never changes in a cell: copied by reference. Parts are meant by their index in `Cell.parts`."""
 
@@ -168,7 +178,7 @@ class Cell:
         line = self.wiring.line_of[index]
         if line < 0:
             raise ValueError(f"unit {unit!r} is on no line")
-        self.send(line, self.controller(unit).frame(text))
+        self.send(line, self.talker(unit).frame(text))
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:
         """Drive an input pin from outside, now: a hand with a wire. Other drivers of its net are not asked."""
@@ -224,6 +234,17 @@ class Cell:
         if not hasattr(part, "status"):
             raise TypeError(f"unit {name!r} is not a controller")
         return part  # type: ignore[return-value]
+
+    def talker(self, name: str) -> Talker:
+        """The controller or adapter of that name. Raises KeyError, TypeError if it has no serial port."""
+        part = self.parts[self.unit(name)]
+        if not hasattr(part, "frame"):
+            raise TypeError(f"unit {name!r} has no serial port")
+        return part  # type: ignore[return-value]
+
+    def talkers(self) -> list[str]:
+        """The units to which a host outside can speak, in file order."""
+        return [name for name, line in zip(self.wiring.names, self.wiring.line_of, strict=False) if line >= 0]
 
     def controllers(self) -> dict[str, Controller]:
         """All controllers by name, in file order."""

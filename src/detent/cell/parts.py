@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from detent.cell import detector
+from detent.cell import damping, detector
 from detent.controllers.catalogue import Option
 from detent.controllers.device import Device
 from detent.lines import sin
@@ -84,13 +84,35 @@ PARTS: dict[str, Part] = {
         sin.PINS,
         (
             Option("baud", "baud", _one_of(*_HOST_RATES), "1200 to 115200", "9600", "rate of the host's side"),
-            Option("line_baud", "line_baud", _one_of(*_AXIS_RATES), "9600, 19200, 38400 or 460800", "9600",
-                   "rate of the party line"),
+            Option(
+                "line_baud",
+                "line_baud",
+                _one_of(*_AXIS_RATES),
+                "9600, 19200, 38400 or 460800",
+                "9600",
+                "rate of the party line",
+            ),
             _SWITCH,
-            Option("mode", "converter", _checked(_mode), "intelligent or converter", "intelligent",
-                   "do the handshake, or be a SIN-8"),
+            Option(
+                "mode",
+                "converter",
+                _checked(_mode),
+                "intelligent or converter",
+                "intelligent",
+                "do the handshake, or be a SIN-8",
+            ),
         ),
         sin.Sin10,
         adapter=True,
+    ),
+    "phase-reversal": Part(
+        "phase-reversal",
+        "bang-bang damper between step clock and drive, from MOV and RAMP",
+        damping.PINS,
+        (
+            Option("brake", "brake", parse_duration, "a duration", "2 ms", "from the last pulse to the step back"),
+            Option("release", "release", parse_duration, "a duration", "3 ms", "from the last pulse to the step forward"),
+        ),
+        damping.PhaseReversal,
     ),
 }

@@ -114,7 +114,7 @@ def _addressed(cell: "Cell", text: str) -> tuple[str, str]:
     from detent.cell.description import Problem
     from detent.controllers.catalogue import unknown
 
-    units = list(cell.controllers())
+    units = cell.talkers() or list(cell.controllers())
     unit, colon, line = (units[0], ":", text) if len(units) == 1 else text.partition(":")
     if not colon:
         raise Problem("", "--send", f"{text!r}: a cell has several units, write UNIT:LINE")
@@ -123,7 +123,7 @@ def _addressed(cell: "Cell", text: str) -> tuple[str, str]:
     if cell.wiring.line_of[cell.unit(unit)] < 0:
         raise Problem("", "--send", f"{unit} is on no line")
     try:
-        cell.controller(unit).frame(line)
+        cell.talker(unit).frame(line)
     except ValueError as error:
         raise Problem("", "--send", str(error)) from None
     return unit, line
@@ -134,20 +134,22 @@ def _exchange(cell: "Cell", unit: str, text: str) -> Exchange:
     from detent.controllers.catalogue import model
     from detent.ticks import NEVER
 
-    line, controller = cell.lines[cell.wiring.line_of[cell.unit(unit)]], cell.controller(unit)
+    line, controller = cell.lines[cell.wiring.line_of[cell.unit(unit)]], cell.talker(unit)
 
     def heard() -> list[str]:
         return controller.answers(bytes(h.char.value for h in line.heard))
 
-    while controller.status(cell.now).state == "starting" and cell.step() is not None:
+    one = cell.controllers().get(unit)  # none: an adapter
+    while one is not None and one.status(cell.now).state == "starting" and cell.step() is not None:
         pass  # a board that is deaf after its reset
     while line.deadline < NEVER and cell.step() is not None:
         pass
     line.take()
     cell.type(unit, text)
-    answered = model(controller.model).answered(text)
+    answered = one is None or model(one.model).answered(text)
     for _ in range(MOST_INSTANTS):
-        if line.deadline >= NEVER and (not answered or heard()):
+        busy = getattr(controller, "answering", False)  # of those that know: an echo is no answer yet
+        if line.deadline >= NEVER and not busy and (not answered or heard()):
             break
         if cell.step() is None:
             break

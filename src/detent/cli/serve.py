@@ -164,7 +164,7 @@ def _straps(description: "Description") -> list[tuple[str, str]]:
         ]
         for unit, levels in zip(units, found[0].strap_line(named), strict=True):
             text = " ".join(f"{pin}={level}" for pin, level in levels.items())
-            listed.append((unit, f"{description.units[unit].model}, straps {text}"))
+            listed.append((unit, f"{description.units[unit].model}, straps {text}" if text else found[0].name))
     return listed
 
 

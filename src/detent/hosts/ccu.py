@@ -12,7 +12,7 @@ from detent.hosts.interpolation import LARGEST_SPEED, UNIT, legs, order_of
 MOVE, CONSTANT, LIMIT, ORIGINATE, STATUS, STOP, EMERGENCY = range(1, 8)
 BACKWARD = 0x80
 LARGEST_STEPS = 0xFFFF
-POLL = 0.005  # seconds between two questions whether a drive has arrived
+POLL = 0.02  # seconds between two questions whether a drive has arrived
 
 
 class Port(Protocol):

@@ -45,9 +45,8 @@ def legs(distances: Sequence[int], fastest: int, message: float = MESSAGE_SECOND
         raise ValueError(f"a speed is 1 to {LARGEST_SPEED} times {UNIT} half steps/s, not {fastest}")
     order = order_of(distances)
     lengths = [abs(distances[axis]) for axis in order]
-    longest = lengths[0] if lengths else 0
     at = [0] * len(lengths)
-    while at[0] < longest:
+    while lengths and at[0] < lengths[0]:
         leg = _next_leg(lengths, at, fastest, message * CLOCK_HZ)
         steps, speeds = [0] * len(order), [0] * len(order)
         for place, axis in enumerate(order):

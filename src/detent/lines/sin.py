@@ -1,7 +1,7 @@
 """The serial adapters SIN-8 and SIN-10: a host on one side, a party line on the other (manual, pages 18 to 20).
 
 They are devices of a cell. Towards the host they speak on TXD and hear on RXD, towards the axes on TX and RX, and
-they drive PARTY. What the manual leaves to the SIN-10's own guide is our assumption (E): see docs/controllers/dcb274.md.
+they drive PARTY. What the manual leaves to the SIN-10's own guide is our assumption (E).
 """
 
 from collections import deque

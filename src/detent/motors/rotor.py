@@ -42,6 +42,7 @@ class Rig(Shared):
         winding = drive.winding
         # a substep must be short beside the winding's time constant, and beside the rotor's swing
         fastest = max((motor.teeth * motor.holding_torque / inertia) ** 0.5, 1e-9)
+        fastest = max(fastest, motor.torque_constant / (inertia * motor.real_inductance) ** 0.5)  # ... and its EMF
         limit = min(0.5 * motor.real_inductance / resistance, 0.1 / fastest)
         if limit < 1e-7:
             raise MotorError(

@@ -122,6 +122,8 @@ def instructions(signals: Signals, name: str) -> list[Band]:
     An instruction lasts to the next one, or to the end of the program, of the supply, or of the run.
     """
     bands: list[Band] = []
+    if name not in signals.recording.units:  # a further axis of a unit
+        return bands
     current: Executing | None = None
     for entry in signals.recording.of(name):
         if entry.at > signals.until:
@@ -131,7 +133,7 @@ def instructions(signals: Signals, name: str) -> list[Band]:
                 if current is not None:
                     bands.append(Band(current.at, entry.at, current.instruction))
                 current = entry
-            case (Finished(at) | Powered(at, False)) if current is not None:
+            case Finished(at) | Powered(at, False) if current is not None:
                 bands.append(Band(current.at, at, current.instruction))
                 current = None
     if current is not None:

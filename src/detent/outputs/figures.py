@@ -14,7 +14,6 @@ from detent.outputs import curves
 from detent.outputs.curves import Band
 from detent.outputs.files import write_whole
 from detent.outputs.signals import Signals, UnitSignals
-from detent.outputs.units import HEARS, SENDS
 from detent.outputs.waves import UNKNOWN
 from detent.ticks import MS, SECOND, US, Ns
 
@@ -110,7 +109,7 @@ def chosen_lanes(signals: Signals) -> list[Pin | Strip]:
     pins: list[Pin | Strip] = []
     for unit in signals.units:
         clocks = set(unit.view.pulse_output.pins.values()) if unit.view.pulse_output is not None else set()
-        quiet = {*clocks, SENDS, HEARS}
+        quiet = {*clocks, unit.view.port.sends, unit.view.port.receives}
         moving = [pin for pin in unit.pins if pin not in quiet and _changes(unit, pin, signals.until)]
         pins += [Pin(unit.name, pin) for pin in moving[: max((MOST_LANES - len(strips)) // len(signals.units), 2)]]
     return strips + pins
@@ -150,7 +149,7 @@ class _Timeline:
         self.colours = {unit.name: COLOURS[n % len(COLOURS)] for n, unit in enumerate(signals.units)}
         self.until = max(signals.until, 1)
         self.scale, self.time_unit = _time_unit(self.until)
-        moving = [unit for unit in signals.units if unit.view.pulse_output is not None or unit.spans]
+        moving = [unit for unit in signals.units if unit.moves]
         self.axes_units = moving
         lanes_height = LANE * len(lanes) + LANES_GAP if lanes else 0
         fixed = TOP + BOTTOM + lanes_height + len(moving) * (GAP + BLOCK_GAP)
@@ -182,7 +181,7 @@ class _Timeline:
 
     def head(self, title: str) -> None:
         """Title, and the run in figures."""
-        units, pulses = len(self.signals.units), sum(unit.pulse_count for unit in self.signals.units)
+        units, pulses = len(self.signals.recording.units), sum(unit.pulse_count for unit in self.signals.units)
         about = [
             f"{units} unit{'s' * (units != 1)}", f"{_number(self.signals.until / self.scale)} {self.time_unit}",
             f"{_number(pulses)} step pulse{'s' * (pulses != 1)}",
@@ -192,7 +191,7 @@ class _Timeline:
 
     def unit_name(self, unit: UnitSignals) -> None:
         """The name of a unit, beside its panels."""
-        self.text(24, self.top - 14, unit.name, fontsize=14, fontweight="bold", color=self.colours[unit.name])
+        self.text(24, self.top - 14, unit.title, fontsize=14, fontweight="bold", color=self.colours[unit.name])
 
     def position_panel(self, unit: UnitSignals) -> "Axes":
         """Where the axis is."""

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
 from detent.cell.recording import Recording, Span
-from detent.outputs.units import SENDS, UnitLog, UnitView, views
+from detent.outputs.units import UnitLog, UnitView, views
 from detent.outputs.waves import BEFORE_ALL, UNKNOWN, Wave, merge, serial_wave, wave
 from detent.pins import PulseOutput
 from detent.pulses.segment import Int64Array
@@ -62,9 +62,17 @@ class Signals:
         for order, (unit, entry) in enumerate(recording):
             if type(entry) not in _MOTION and entry.at <= until:
                 logs[unit].take(order, entry)
-        self.units = tuple(
-            UnitSignals(log, _clipped(recording.motion(log.view.name, until), until), until) for log in logs
-        )
+        found = []
+        for log in logs:
+            first, *others = log.view.axes
+            name = log.view.name
+            found.append(UnitSignals(log, _clipped(recording.motion(name, until, first), until), until))
+            for axis in others:  # each further axis of a unit is one of its own, without the pins
+                alone = UnitLog(UnitView(f"{name}.{axis}", shaft=log.view.shaft))
+                found.append(
+                    UnitSignals(alone, _clipped(recording.motion(name, until, axis), until), until, moves=True)
+                )
+        self.units = tuple(found)
 
     def unit(self, name: str) -> "UnitSignals":
         """The signals of one unit. Raises KeyError."""
@@ -85,8 +93,11 @@ class Signals:
 class UnitSignals:
     """The wires of one unit. `pins` are those that carry something to draw, in the order of the pin table."""
 
-    def __init__(self, log: UnitLog, spans: Sequence[Span], until: Ns) -> None:
+    def __init__(self, log: UnitLog, spans: Sequence[Span], until: Ns, *, moves: bool = False) -> None:
         self.view, self.name = log.view, log.view.name
+        axes = log.view.axes
+        self.title = self.name if len(axes) == 1 else f"{self.name}.{axes[0]}"  # of the axis, for people
+        self.moves = moves or log.view.pulse_output is not None or bool(spans)  # it has an axis
         self.spans = tuple(spans)
         self.pins = log.drawn()
         self._ends = [span.ends for span in spans]
@@ -182,7 +193,7 @@ class UnitSignals:
         form = self.view.line_format
         if form is not None and pin in log.characters:
             bits = serial_wave(log.characters[pin], form).between(0, self._until + 1)
-            if pin == SENDS:
+            if pin == self.view.port.sends:
                 bits = bits.where(self._is_powered(bits.times))
             changes = merge(bits, changes)
         return changes.tidy(self._initial[pin])

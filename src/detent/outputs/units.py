@@ -9,9 +9,9 @@ from detent.controllers.device import Powered
 from detent.outputs.waves import UNKNOWN, Spoken, Wave, wave
 from detent.pins import HIGH, Level, Pin, PinKind, PinSet, PulseOutput
 from detent.ticks import Ns
-from detent.uart import Format, Sent
+from detent.uart import Format, Sent, SerialPort
 
-SENDS, HEARS = "TXD", "RXD"  # the serial pins of a controller
+USUAL_PORT = SerialPort("RXD", "TXD")
 
 
 class UnitView(NamedTuple):
@@ -24,6 +24,8 @@ class UnitView(NamedTuple):
     inputs: Mapping[str, Level] = {}  # levels before the first `InputSet`; an input not named here rests
     powered: bool = False  # before the first `Powered`
     shaft: int = 0  # where the axis stands before its first motion, in steps
+    port: SerialPort = USUAL_PORT
+    axes: Sequence[str] = ("",)  # the names of its axes
 
 
 def views(cell: Cell, shafts: Mapping[str, int] | None = None) -> list[UnitView]:
@@ -37,7 +39,10 @@ def views(cell: Cell, shafts: Mapping[str, int] | None = None) -> list[UnitView]
             found.append(UnitView(name, part.pins))
         else:
             output, form = controller.pulse_output, controller.line_format
-            found.append(UnitView(name, part.pins, output, form, shaft=shafts.get(name, 0)))
+            found.append(
+                UnitView(name, part.pins, output, form, shaft=shafts.get(name, 0), port=controller.serial_port,
+                         axes=controller.axes)
+            )  # fmt: skip
     return found
 
 
@@ -65,9 +70,9 @@ class UnitLog:
         self.characters: dict[str, list[Spoken]] = {}  # by port
         self._changes: dict[str, _Changes] = {}
         self._powered = _Changes()
-        self._rests = {pin.name: pin.rest for pin in view.pins if pin.kind.drives}
+        self._rests = {p.name: p.rest for p in view.pins if p.kind.drives and p.kind is not PinKind.WINDING}
         if view.line_format is not None:
-            self._rests[SENDS] = HIGH
+            self._rests[view.port.sends] = HIGH
 
     def take(self, order: int, entry: object) -> None:
         """Note one entry of the recording, whose place in it is `order`."""
@@ -75,7 +80,7 @@ class UnitLog:
             case PinSet(at, pin, level):
                 self._changes_of(pin).add(at, level, order)
             case InputSet(at, pin, level):
-                if pin != HEARS:  # as a strap RXD is a voltage, not a logic level
+                if pin != self.view.port.receives:  # as a strap RXD is a voltage, not a logic level
                     self._changes_of(pin).add(at, level, order)
             case Sent(at, port, char, done):
                 self.characters.setdefault(port, []).append(Spoken(at, done, char, order))
@@ -115,7 +120,9 @@ class UnitLog:
 
     def _is_drawn(self, pin: Pin) -> bool:
         if pin.kind is PinKind.SERIAL:
-            return self.view.line_format is not None and pin.name in (SENDS, HEARS)
+            return self.view.line_format is not None and pin.name in (self.view.port.sends, self.view.port.receives)
+        if pin.kind is PinKind.WINDING:
+            return pin.name in self._changes
         if pin.kind is PinKind.STRAP:
             return pin.name in self._changes or pin.name in self.view.inputs
         return pin.kind.drives or pin.kind is PinKind.INPUT

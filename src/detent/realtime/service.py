@@ -50,7 +50,10 @@ class Service:
         names = self.cell.wiring.line_names
         if not names:
             raise Problem(description.file, "units", "there is no unit with a serial line to serve")
-        choices = [_for_line(description, wanted, number, name, len(names)) for number, name in enumerate(names)]
+        outside = [number for number, line in enumerate(self.cell.lines) if not line.hosted]
+        choices: list[Sequence[Wanted]] = [()] * len(names)
+        for place, number in enumerate(outside):
+            choices[number] = _for_line(description, wanted, place, names[number], len(outside))
         self.endpoints: list[Served] = []
         self._opened: list[tuple[int, Endpoint]] = []
         self._cleanup = contextlib.ExitStack()

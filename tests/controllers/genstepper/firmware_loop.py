@@ -47,6 +47,11 @@ class LoopMotor:
         if self.state != "idle":
             self.begin_stop(None)
 
+    def set_keep(self, keep):
+        self.keep = keep
+        if self.state == "stop":
+            self.maybe_stopped()
+
     def set_position(self, position):
         self.position = position
         self.stop()

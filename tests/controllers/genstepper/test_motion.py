@@ -1,6 +1,7 @@
 """Motion of a board, exact on the tick, whatever is said to it on the way (manual, pages 22, 27, 31 to 33, 36, 38)."""
 
 import copy
+from itertools import pairwise
 
 import pytest
 from hypothesis import given, settings
@@ -38,7 +39,7 @@ def obey(loop: LoopMotor, letter: str, value: object) -> None:
         case "P", int():
             loop.slope = value
         case "K", int():
-            loop.keep = value
+            loop.set_keep(value)
         case "=", int():
             loop.set_position(value)
 
@@ -188,7 +189,7 @@ def test_page_29_62500k_prevents_all_ramps():
     board.send("100G")
     board.until_idle()
     times = [at for at, _ in board.pulses()]
-    assert {later - before for before, later in zip(times, times[1:], strict=False)} == {12 * TICK, 13 * TICK}
+    assert {later - before for before, later in pairwise(times)} == {12 * TICK, 13 * TICK}
 
 
 def test_the_numbers_of_the_step_action_in_order():

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 
 from hypothesis import strategies as st
+from tests.controllers.conformance import Candidate
 
 from detent.controllers.gsc200.firmware import GsC200
 from detent.ticks import MS, US, Ns
 from detent.uart import Char
-from tests.controllers.conformance import Candidate
 
 INPUTS = ("UI1", "UI2", "UI3", "ENABLE", "HOME", "EOT")
 USER_PINS = st.sampled_from("123")
@@ -15,7 +15,8 @@ USER_PINS = st.sampled_from("123")
 
 def _number(low: int, high: int) -> st.SearchStrategy[str]:
     """Numbers, more often small ones and the ends."""
-    return (st.sampled_from([low, low + 1, high]) | st.integers(low, min(high, low + 30)) | st.integers(low, high)).map(str)
+    ends = st.sampled_from([low, low + 1, high])
+    return (ends | st.integers(low, min(high, low + 30)) | st.integers(low, high)).map(str)
 
 
 def _signed(high: int) -> st.SearchStrategy[str]:
@@ -89,9 +90,7 @@ def _garbage(values: bytes, damaged: list[int], pause: Ns) -> list[tuple[Ns, Cha
 PAUSES = st.sampled_from([0, 1_145_833, 1_145_834])  # all at once, or at 9600 baud
 
 
-def frames(
-    module: GsC200, fastest: int = 1000, longest: int = 999_999
-) -> st.SearchStrategy[list[tuple[Ns, Char]]]:
+def frames(module: GsC200, fastest: int = 1000, longest: int = 999_999) -> st.SearchStrategy[list[tuple[Ns, Char]]]:
     """What a host sends to `module`, as characters with pauses."""
     model = module.model
     texts = st.one_of(
@@ -105,9 +104,7 @@ def frames(
     return st.one_of(sound, sound, sound, garbage)
 
 
-def _candidate(
-    name: str, model: str, straps: dict[str, int], *, watched: bool = False, **options: object
-) -> Candidate:
+def _candidate(name: str, model: str, straps: dict[str, int], *, watched: bool = False, **options: object) -> Candidate:
     def make() -> GsC200:
         module = GsC200(model, straps, **options)  # type: ignore[arg-type]
         if watched:

@@ -9,16 +9,16 @@ from typing import NamedTuple
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from tests.controllers.gsc200 import inputs
 
 from detent.controllers.device import Executing, Refused, StoreImage
 from detent.controllers.gsc200.firmware import GsC200
 from detent.ticks import MS, SECOND
 from detent.uart import Char, Sent
-from tests.controllers.gsc200 import inputs
 
 SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck)}
 FAST = settings(max_examples=120, **SETTINGS)
-THOROUGH = settings(max_examples=2500, **SETTINGS)
+THOROUGH = settings(max_examples=800, **SETTINGS)
 SEL = {1: (0, 1, 1), 2: (1, 0, 1), 3: (0, 0, 1), 4: (1, 1, 0), 5: (0, 1, 0), 6: (1, 0, 0), 7: (0, 0, 0)}
 
 
@@ -165,7 +165,7 @@ def check_refusals(data: st.DataObject) -> None:
     story = _lived(kind, data.draw(_histories(kind.model)))
     text = data.draw(_texts(kind.model))
     frame = kind.frame(text)
-    if data.draw(st.booleans()):  # something happens to it on its way
+    if len(frame) > 1 and data.draw(st.booleans()):  # something happens to it on its way
         at = data.draw(st.integers(0, len(frame) - 2))
         frame = frame[:at] + bytes([frame[at] ^ data.draw(st.sampled_from([1, 2, 16, 128]))]) + frame[at + 1 :]
     assume(frame.count(b"\r") == 1)

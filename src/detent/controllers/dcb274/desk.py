@@ -68,6 +68,9 @@ class Desk:
         self._cells: range | tuple[int, ...] = ()  # of it
         self._result = ""  # of the command that stores
         self._reload = False  # the parameters, when it is stored
+        self._name = 0  # that is being stored
+        self._ram = b""  # with the instruction that is being stored
+        self._length = 0  # of that instruction
 
     @property
     def busy(self) -> bool:
@@ -82,7 +85,10 @@ class Desk:
     # -- entry -------------------------------------------------------------------------------------------
 
     def enter(self, line: str, too_long: bool, now: Ns) -> None:
-        """A line is complete."""
+        """A line is complete. With nothing behind the name it asks whether the axis is there (page 26)."""
+        if not line and not too_long and self._speaker.mode.named:
+            self._finish("", now)
+            return
         try:
             if too_long:
                 raise Refusal("the line is too long")
@@ -198,18 +204,25 @@ class Desk:
 
     def _store_instruction(self, instruction: Instruction, now: Ns) -> None:
         """Program mode: an instruction, or the end mark of the closing P, which ignores its address."""
-        if instruction.op is Op.PROGRAM:
-            self.programming = False
-            data = bytes((END,)) if allowed(self._address) else b""
-        else:
+        if instruction.op is not Op.PROGRAM:
             data = encode(instruction)
-        first, self._address = self._address, self._address + len(data)
-        cells = tuple(a for a in range(first, first + len(data)) if a not in SHADOW)
-        image = self._work.memory.put(first, data)
+        else:
+            data = bytes((END,)) if allowed(self._address) else b""
+        cells = tuple(a for a in range(self._address, self._address + len(data)) if a not in SHADOW)
+        self._ram, image = self._work.memory.put(self._address, data)
+        self._length = len(data)
         if image is None:
+            self._entered()
             self._finish("", now)
         else:
             self._store(image, cells, now)
+
+    def _entered(self) -> None:
+        """An instruction of program mode is in memory, or the end mark, which ends the mode."""
+        assert self._instruction is not None
+        self._work.memory.ram = self._ram
+        self._address += self._length
+        self.programming = self._instruction.op is not Op.PROGRAM
 
     def _store(
         self, image: bytes, cells: range | tuple[int, ...], now: Ns, result: str = "", *, reload: bool = False
@@ -220,7 +233,7 @@ class Desk:
 
     def store_name(self, name: int, now: Ns) -> None:
         """^N: the name is stored at once."""
-        self._work.settings.name = name
+        self._name = name
         self._store(self._work.memory.with_bytes({settings.NAME: name}), (settings.NAME,), now)
 
     def stored(self, ok: bool, now: Ns) -> None:
@@ -229,9 +242,13 @@ class Desk:
             return
         if ok:
             self._work.memory.commit(self._image, self._cells)
+            if self._name:
+                self._work.settings.name = self._name
+            elif self.programming:
+                self._entered()
             if self._reload:
                 self._reloaded(now)
-        self._image = b""
+        self._image, self._name = b"", 0
         self._finish(self._result if ok else "#", now)
 
     # -- keys while listing or naming --------------------------------------------------------------------

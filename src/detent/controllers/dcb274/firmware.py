@@ -27,7 +27,7 @@ from detent.controllers.dcb274.link import (
     next_name,
 )
 from detent.controllers.dcb274.memory import POWER_UP, Memory
-from detent.controllers.dcb274.motion import Course, Motion, News
+from detent.controllers.dcb274.motion import Motion, News
 from detent.controllers.dcb274.ports import Ports
 from detent.controllers.dcb274.running import Running
 from detent.controllers.dcb274.settings import Settings
@@ -75,6 +75,7 @@ class Dcb274:
         self._set_inputs: set[str] = set()  # that something drives: the others follow the PLC jumper
         self._base = 0  # of the program that was loaded
         self._powered = False
+        self._quiet = False  # nothing is under way: characters for others need no more than a look
         self._inbox: deque[int] = deque()  # characters that wait until a command has executed
         self._entry: Entry = SingleEntry()
         self.mode = Mode.WAITING
@@ -100,6 +101,7 @@ class Dcb274:
         self.advance(now)
         if on == self._powered:
             return
+        self._quiet = False
         self._powered = on
         self._transmitter = self._new_transmitter()
         self._out.append(Powered(now, on))
@@ -118,6 +120,12 @@ class Dcb274:
 
     def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
         """Characters on RX whose stop bits end at `now`."""
+        if self._quiet and len(chars) == 1:
+            value, parity_ok, framing_ok = chars[0]
+            entry = self._entry
+            if parity_ok and framing_ok and isinstance(entry, NamedEntry) and entry.skips(value):
+                return
+        self._quiet = False
         self.advance(now)
         for char in chars:
             if self._powered:
@@ -125,9 +133,22 @@ class Dcb274:
                 self._receive(char.value if sound else 0xFF, now)
                 self._poll(now)
                 self.advance(now)
+        self._rest()
+
+    def _rest(self) -> None:
+        """Note whether nothing is under way, so that nothing happens but by an input."""
+        self._quiet = (
+            self.mode is Mode.PARTY
+            and self._powered
+            and self._desk.stage is Stage.FREE
+            and not self._running.active
+            and not self._inbox
+            and self._next() >= NEVER
+        )
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
         """An input takes a level. PARTY counts at the next reset, the jumpers at the next power-on."""
+        self._quiet = False
         self.advance(now)
         if pin in self._straps:
             self._straps[pin] = level
@@ -149,6 +170,7 @@ class Dcb274:
 
     def stored(self, ok: bool, now: Ns) -> None:
         """The NV memory was written, or not."""
+        self._quiet = False
         self._desk.stored(ok, now)
         if isinstance(self._entry, NamedEntry) and self.mode is Mode.PARTY:
             self._entry.name = self._settings.name
@@ -157,11 +179,15 @@ class Dcb274:
 
     def next_deadline(self) -> Ns | None:
         """The earliest of: motion, program, command, next character out, readout."""
+        if self._quiet:
+            return None
         deadline = self._next()
         return None if deadline >= NEVER else deadline
 
     def advance(self, now: Ns) -> None:
         """Do what is due, in order of time; in one instant steps come first."""
+        if self._quiet:
+            return
         while (at := self._next()) <= now:
             if self._motion.deadline <= at:
                 self._heed(self._motion.advance(at), at)
@@ -173,9 +199,12 @@ class Dcb274:
                 self._transmitter.advance(at)
                 continue
             self._poll(at)
+        self._rest()
 
     def drain(self) -> list[Output]:
         """What the unit did since the last call."""
+        if not self._out:
+            return []
         out = self._out.copy()
         self._out.clear()
         return out
@@ -219,7 +248,7 @@ class Dcb274:
         motion = self._motion
         if not self._powered:
             state = "off"
-        elif motion.course in (Course.SEEK_LOW, Course.SEEK_HIGH):
+        elif motion.homing:
             state = "homing"
         elif self._running.active:
             state = "running"
@@ -263,7 +292,7 @@ class Dcb274:
         if len(data) - len(places) > len(range(193, 256)) + 1 or (image and not program.allowed(base)):
             raise program.Damaged(f"no program of {len(image)} bytes may stand at {base}")
         for address in places:
-            nv = self.memory.put(address, data[address - base : address - base + 1])
+            self.memory.ram, nv = self.memory.put(address, data[address - base : address - base + 1])
             if nv is not None:
                 self.memory.commit(nv, (address,))
         self._base = base
@@ -271,6 +300,7 @@ class Dcb274:
 
     def start(self, now: Ns) -> None:
         """Start the program that was loaded, as G would; nothing happens while one runs, or without power."""
+        self._quiet = False
         self.advance(now)
         if self._powered and not self._running.active:
             self._running.go(self._base, False, now)

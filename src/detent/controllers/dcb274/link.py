@@ -120,6 +120,9 @@ class SingleEntry:
         self._too_long = False
 
 
+_SINGLE: Final = frozenset((ESC, CTRL_C, CTRL_N, CTRL_P))
+
+
 class _Place(Enum):
     """Where a line of several axes is."""
 
@@ -182,6 +185,22 @@ class NamedEntry:
             case _Place.MINE:
                 self._place = _Place.OTHERS  # a line that a program has cut off
         return self._foreign(value)
+
+    def skips(self, value: int) -> bool:
+        """Take a character that means nothing to this axis; False, and it is not taken, if it may mean something.
+
+        Of 32 axes on a line, 31 do nothing else with nearly every character.
+        """
+        place = self._place
+        if self._passes or value in _SINGLE or place is _Place.MINE or place is _Place.TAKEN:
+            return False
+        if value == LF:
+            self._place = _Place.START
+        elif value == self.name and place is _Place.START:
+            return False
+        else:
+            self._place = _Place.OTHERS
+        return True
 
     def clear(self) -> None:
         """As behind a LF."""

@@ -76,8 +76,8 @@ class Memory:
         """How many of these bytes are fetched from NV memory, and not from shadow RAM."""
         return sum(byte not in SHADOW for byte in range(address, address + length))
 
-    def put(self, address: int, data: bytes) -> bytes | None:
-        """Bytes of a program, 128-191 into shadow RAM at once; the NV image to be stored, None if there is none."""
+    def put(self, address: int, data: bytes) -> tuple[bytes, bytes | None]:
+        """Shadow RAM and NV image with these bytes of a program; None for the image if no byte goes there."""
         ram, image, changed = bytearray(self.ram), bytearray(self.nv), False
         for byte, value in enumerate(data, address):
             if byte in SHADOW:
@@ -85,8 +85,7 @@ class Memory:
             else:
                 image[byte] = value
                 changed = True
-        self.ram = bytes(ram)
-        return bytes(image) if changed else None
+        return bytes(ram), bytes(image) if changed else None
 
     def with_bytes(self, cells: Mapping[int, int]) -> bytes:
         """The NV image with these cells written."""

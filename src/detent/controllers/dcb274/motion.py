@@ -90,6 +90,11 @@ class Motion:
         """Whether an index or a homing is under way: what W waits for."""
         return self.course in _INDEXING
 
+    @property
+    def homing(self) -> bool:
+        """Whether home is looked for."""
+        return self.course in (Course.SEEK_LOW, Course.SEEK_HIGH)
+
     def completing(self, now: Ns) -> bool:
         """Whether an action is in its completion cycle (page 27)."""
         if self.course is Course.VELOCITY:
@@ -376,7 +381,7 @@ class Motion:
             return NOTHING
         self.step_period, self._stepped = now - self._stepped, now
         self._axis.every_pulse = False
-        self._axis.start(Train((Uniform(-to_fixed(1), 1, 1, 1),), to_fixed(now)), direction, (), now)
+        self._axis.start(Train((Uniform(0, 1, 1, 1),), to_fixed(now - 1)), direction, (), now)
         self._axis.advance(now)
         if self._ports.pulses_are_wired:
             self._ports.pulse(now)

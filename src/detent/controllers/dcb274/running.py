@@ -105,7 +105,7 @@ class Running:
         match self.stage:
             case Stage.HELD:
                 assert self._instruction is not None
-                if self._work.ready(self._instruction, now):
+                if self._ready(self._instruction, now):
                     self._begin(now)
             case Stage.MOTION:
                 if not motion.indexing:
@@ -138,10 +138,16 @@ class Running:
         text = commands.spell(instruction)
         self._out.append(Executing(now, self.address, text))
         printed = self._say(f"{self.address} {text}", now) if self.trace else now
-        if self._work.ready(instruction, now):
+        if self._ready(instruction, now):
             self._begin(printed)
         else:
             self.stage = Stage.HELD
+
+    def _ready(self, instruction: Instruction, now: Ns) -> bool:
+        """As for typed commands; and O behind F waits for home, as the program on page 47 has it."""
+        if instruction.op is Op.ORIGIN and self._work.motion.homing:
+            return False
+        return self._work.ready(instruction, now)
 
     def _begin(self, now: Ns) -> None:
         assert self._instruction is not None

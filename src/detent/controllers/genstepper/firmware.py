@@ -91,9 +91,10 @@ class GenStepper:
         if on:
             self._out.append(Powered(now, on))
             for pin in self.pins:
-                if pin.kind.drives:
+                if pin.kind is PinKind.OUTPUT:
                     self._driver.set(pin.name, pin.rest, now)
             self._reset(self._order.step_size, now)
+            self._settle(now)
         else:
             self._phase = Phase.OFF
             self._clear(now, self._order.step_size)
@@ -108,7 +109,7 @@ class GenStepper:
                 self._cancel()
                 if char.framing_ok and char.parity_ok:
                     self._take(chr(char.value), now)
-        self._settle(now)
+                    self._settle(now)
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
         """An input takes a level; SI low is the start bit of a character. Jumpers count at the next reset."""

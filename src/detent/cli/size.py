@@ -1,0 +1,197 @@
+"""The verb `size`: supplies and currents as a controller's manual computes them, a page for each."""
+
+import json as json_text
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+
+class Quantity(NamedTuple):
+    """Something that a page asks: how it is written, its unit, what it is if nobody says; None: it must be given."""
+
+    name: str
+    read: Callable[[str], Any]  # ValueError
+    takes: str
+    default: str | None
+    help: str
+
+
+class Line(NamedTuple):
+    """A line of the answer."""
+
+    what: str
+    value: str
+
+
+class Answer(NamedTuple):
+    """What a page computes: lines for people, the same as data, and warnings."""
+
+    lines: Sequence[Line]
+    facts: Mapping[str, Any]
+    warnings: Sequence[str]
+
+
+class Page(NamedTuple):
+    """A page of a manual: what it asks, and how it answers. `answer` raises ValueError."""
+
+    title: str
+    quantities: Sequence[Quantity]
+    answer: Callable[[Mapping[str, Any]], Answer]
+
+
+def size(page: str | None = None, values: Sequence[str] = (), /, *, json: bool = False) -> None:
+    """Compute supplies and currents for a controller, with the warnings of its manual.
+
+    Without a page the pages are listed, without values what a page asks.
+
+    Parameters
+    ----------
+    page
+        A controller by name.
+    values
+        What is known, each NAME=VALUE.
+    json
+        Print the result as JSON.
+    """
+    from detent.cli.target import asked_wrongly
+    from detent.controllers.catalogue import unknown
+
+    if page is None:
+        for name, found in PAGES.items():
+            print(f"{name:8}  {found.title}")
+        print(f"\nWhat it asks: detent size {next(iter(PAGES))}")
+        return
+    if page not in PAGES:
+        asked_wrongly(unknown("page", page, tuple(PAGES)))
+    chosen = PAGES[page]
+    if not values:
+        _print_questions(page, chosen)
+        return
+    try:
+        given = _read(chosen, values)
+        answer = chosen.answer(given)
+    except ValueError as error:
+        asked_wrongly(error)
+    if json:
+        print(json_text.dumps({"page": page, **answer.facts, "warnings": list(answer.warnings)}))
+        return
+    width = max(len(line.what) for line in answer.lines)
+    for line in answer.lines:
+        print(f"{line.what:{width}}  {line.value}")
+    for warning in answer.warnings:
+        print(f"  ! {warning}")
+
+
+def _print_questions(name: str, page: Page) -> None:
+    print(page.title)
+    width = max(len(quantity.name) for quantity in page.quantities)
+    for quantity in page.quantities:
+        default = "" if not quantity.default else f" [{quantity.default}]"
+        print(f"  {quantity.name:{width}}  {quantity.help}: {quantity.takes}{default}")
+    needed = " ".join(f"{quantity.name}=..." for quantity in page.quantities if quantity.default is None)
+    print(f"\nLike: detent size {name} {needed}")
+
+
+def _read(page: Page, values: Sequence[str]) -> dict[str, Any]:
+    """The values as the page takes them. ValueError with the remedy."""
+    from detent.controllers.catalogue import unknown
+
+    known = {quantity.name: quantity for quantity in page.quantities}
+    written: dict[str, str] = {}
+    for item in values:
+        name, equals, value = item.partition("=")
+        if not equals:
+            raise ValueError(f"{item!r}: write NAME=VALUE; names are {', '.join(known)}")
+        if name not in known:
+            raise unknown("quantity", name, tuple(known))
+        written[name] = value
+    read: dict[str, Any] = {}
+    for name, quantity in known.items():
+        text = written.get(name, quantity.default)
+        if text is None:
+            raise ValueError(f"{name} is missing: {quantity.help}, {quantity.takes}")
+        try:
+            read[name] = quantity.read(text)
+        except ValueError:
+            raise ValueError(f"{name} cannot be {text!r}; it takes {quantity.takes}") from None
+    return read
+
+
+def number_with(unit: str) -> Callable[[str], float]:
+    """A reader of plain numbers that may carry their unit."""
+
+    def read(text: str) -> float:
+        value = float(text.strip().removesuffix(unit))
+        if not 0 <= value < 1e9:
+            raise ValueError(text)
+        return value
+
+    return read
+
+
+def one_of(**meanings: Any) -> Callable[[str], Any]:
+    """A reader of words, in either case."""
+
+    def read(text: str) -> Any:
+        found = {word.lower(): meaning for word, meaning in meanings.items()}
+        if text.strip().lower() not in found:
+            raise ValueError(text)
+        return found[text.strip().lower()]
+
+    return read
+
+
+def _genstepper(given: Mapping[str, Any]) -> Answer:
+    from detent.controllers.genstepper.supply import STEP_MODES, Question, size, voltage_for
+
+    values = dict(given)
+    current = values.pop("current")
+    if current is not None and values["voltage"] is None:
+        values["voltage"] = voltage_for(current, values["resistance"])
+    if values["voltage"] is None:
+        raise ValueError("voltage is missing: of the motor supply, or current=A to have it computed")
+    question = Question(**values)
+    sheet = size(question)
+    mode = STEP_MODES[question.mode]
+    lines = [
+        Line("motor supply", f"{question.voltage:.3g} V"),
+        Line("winding current", f"{sheet.winding_current:.3g} A"),
+        Line(f"{question.motors} motor{'s' * (question.motors > 1)}, {mode.name}",
+             f"{sheet.motor_current[0]:.3g} A, recommended {sheet.motor_current[1]:.3g} A"),
+        Line("logic", f"{sheet.logic_current:.3g} A"),
+        Line("single supply" if question.supply == "SS" else "motor supply alone",
+             f"{sheet.supply_current[0]:.3g} A, recommended {sheet.supply_current[1]:.3g} A"),
+    ]  # fmt: skip
+    facts = {
+        "voltage_v": question.voltage,
+        "winding_a": sheet.winding_current,
+        "motors_a": {"absolute": sheet.motor_current[0], "recommended": sheet.motor_current[1]},
+        "logic_a": sheet.logic_current,
+        "supply_a": {"absolute": sheet.supply_current[0], "recommended": sheet.supply_current[1]},
+    }
+    return Answer(lines, facts, sheet.warnings)
+
+
+def _maybe(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    return lambda text: read(text) if text else None
+
+
+_YES_NO = one_of(yes=True, no=False)
+_BOARD = (
+    Quantity("resistance", number_with("ohm"), "ohm", None, "of one winding"),
+    Quantity("voltage", _maybe(number_with("V")), "V", "", "of the motor supply"),
+    Quantity("current", _maybe(number_with("A")), "A", "", "wanted in a winding, instead of the voltage"),
+    Quantity("mode", int, "0 to 3, as O", "3", "step mode"),
+    Quantity("motors", int, "1 or 2", "1", "how many motors alike"),
+    Quantity(
+        "supply", one_of(SS="SS", DS="DS", **{"5VO": "5VO"}), "SS, DS or 5VO", "SS", "the power jumper: one or two"
+    ),
+    Quantity("logic_voltage", _maybe(number_with("V")), "V", "", "at Vc, with two supplies"),
+    Quantity("half_power", _YES_NO, "yes or no", "no", "1H or the jumper"),
+    Quantity("double_current", _YES_NO, "yes or no", "no", "one motor on both connectors"),
+    Quantity("tap", number_with("A"), "A", "0", "from the board's 5 V, for a fan or other logic"),
+)
+
+PAGES: dict[str, Page] = {
+    "bs0610": Page("BS0610: power supply requirements (manual, pages 62 to 68)", _BOARD, _genstepper),
+    "bs0710": Page("BS0710: power supply requirements (manual, pages 62 to 68)", _BOARD, _genstepper),
+}

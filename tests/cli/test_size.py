@@ -1,0 +1,87 @@
+"""The verb `size` and its pages (BS0610 manual, pages 62 to 68)."""
+
+import json
+
+import pytest
+
+from detent.cli import main
+from detent.cli.size import PAGES
+from detent.controllers.genstepper.supply import STEP_MODES, Question, size, voltage_for
+
+
+@pytest.mark.parametrize(("mode", "factors"), [(0, (1.0, 1.4)), (1, (2.0, 2.5)), (2, (2.0, 2.5)), (3, (1.7, 2.3))])
+def test_page_64_current_multipliers_by_step_mode(mode, factors):
+    sheet = size(Question(12, 30, mode))
+    assert sheet.winding_current == pytest.approx(0.4)
+    assert sheet.motor_current == pytest.approx([0.4 * factor for factor in factors])
+    assert (STEP_MODES[mode].absolute, STEP_MODES[mode].recommended) == factors
+
+
+def test_page_64_winding_currents_and_page_65_the_voltage_for_a_current():
+    assert size(Question(6, 3)).winding_current == 2
+    assert size(Question(12, 3)).winding_current == 4
+    assert voltage_for(0.5, 12) == 6
+
+
+def test_page_66_a_single_supply_feeds_the_logic_too_and_two_motors_double_the_current():
+    single, dual = size(Question(12, 30, 3, 2)), size(Question(12, 30, 3, 2, "DS", 7))
+    assert single.supply_current == pytest.approx((2 * 0.68 + 0.3, 2 * 0.92 + 0.3))
+    assert dual.supply_current == pytest.approx((2 * 0.68, 2 * 0.92))
+
+
+@pytest.mark.parametrize(
+    ("question", "warning"),
+    [
+        (Question(12, 30, 3), "worked example"), (Question(12, 10), "product failure"), (Question(12, 25), "fan must be used"),
+        (Question(24, 100), "above 15 V"), (Question(24, 100), "SS is 6.5 to 15 V"), (Question(40, 100, supply="DS"), "4.5 to 34"),
+        (Question(7, 100), "7.5 to 15 V"), (Question(12, 100, logic_voltage=7), "nothing is to be connected"),
+        (Question(12, 100, supply="DS"), "DS needs"), (Question(12, 100, supply="DS", logic_voltage=16), "DS needs"),
+        (Question(12, 100, supply="5VO", logic_voltage=6), "exactly 5 V"), (Question(12, 100, tap=0.2), "fan cooled"),
+        (Question(12, 100, tap=0.6), "500 mA"),
+    ],
+)  # fmt: skip
+def test_it_warns_as_the_manual_does(question, warning):
+    assert any(warning in told for told in size(question).warnings)
+
+
+def test_what_is_within_limits_is_not_warned_of():
+    assert size(Question(12, 40, 2)).warnings == ()
+    assert size(Question(12, 10, 2, double_current=True, supply="DS", logic_voltage=7)).warnings != ()
+    assert size(Question(24, 100, 2, supply="DS", logic_voltage=7)).warnings == (
+        "above 15 V of motor supply fan based cooling of the board is required (pages 14, 63)",
+    )
+
+
+@pytest.mark.parametrize("wrong", [Question(0, 1), Question(1, 0), Question(1, 1, 4), Question(1, 1, motors=3),
+                                   Question(1, 1, supply="XX"), Question(1, 1, motors=2, double_current=True)])  # fmt: skip
+def test_what_is_no_supply_is_an_error(wrong):
+    with pytest.raises(ValueError, match=r"."):
+        size(wrong)
+
+
+def run(*words):
+    with pytest.raises(SystemExit) as end:
+        main(["size", *words])
+    return end.value.code or 0
+
+
+def test_the_verb_lists_pages_questions_and_answers(capsys):
+    assert run() == 0
+    assert all(name in capsys.readouterr().out for name in ["bs0610"])
+    for name, page in PAGES.items():
+        assert run(name) == 0
+        text = capsys.readouterr().out
+        assert all(quantity.name in text for quantity in page.quantities)
+    assert run("bs0610", "voltage=12V", "resistance=30", "motors=2") == 0
+    assert "1.84 A" in capsys.readouterr().out
+    assert run("bs0710", "current=0.5A", "resistance=12ohm", "--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["page"], facts["voltage_v"], facts["winding_a"]) == ("bs0710", 6, 0.5)
+
+
+@pytest.mark.parametrize("words", [["bs061"], ["bs0610", "voltage"], ["bs0610", "volts=3"], ["bs0610", "voltage=x", "resistance=1"],
+                                   ["bs0610", "voltage=12"], ["bs0610", "resistance=12"], ["bs0610", "voltage=0", "resistance=1"],
+                                   ["bs0610", "voltage=1", "resistance=1", "supply=AB"]])  # fmt: skip
+def test_a_wrong_question_ends_with_2_and_a_remedy(words, capsys):
+    assert run(*words) == 2
+    assert capsys.readouterr().err

@@ -1,0 +1,156 @@
+"""The kernels: plain, compiled, abreast and as a thread of a GPU they give the same numbers; a run may be cut anywhere."""
+
+import os
+import subprocess
+import sys
+from math import cos, exp, pi, sin
+
+import numpy as np
+import pytest
+
+from detent.motors import engine, kernel
+from detent.motors.drive import Drive
+from detent.motors.excitation import Sequencer
+from detent.motors.motor import MotorError
+from detent.motors.move import simulate
+from detent.motors.rotor import Rig, Rotor
+from detent.motors.variants import changed, judge
+from detent.motors.winding import FULL, HALF
+from detent.ticks import MS, US
+from tests.motors.moves import SMALL, even, ramped, rig
+
+compiled_only = pytest.mark.skipif(not engine.fast(), reason="numba is not installed")
+
+
+def state_after(rig: Rig, times, *, plain: bool, monkeypatch: pytest.MonkeyPatch) -> tuple[list[float], list[int]]:  # type: ignore[no-untyped-def]
+    if plain:
+        monkeypatch.setattr(engine, "advance", lambda: kernel.advance)
+    sequencer = Sequencer(rig.drive)
+    rotor = Rotor(rig, sequencer)
+    rotor.run(sequencer.pulses(times, 1), int(times[-1]) + 5 * MS)
+    return rotor.s.tolist(), rotor.n.tolist()
+
+
+@compiled_only
+@pytest.mark.parametrize("decay", ["fast", "slow", "voltage"])
+def test_compiled_and_plain_agree_to_the_last_bit(decay: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = Rig(SMALL.changed(detent_torque=0.01), Drive(24, 1.0, HALF, decay))  # type: ignore[arg-type]
+    times = even(900, 40)
+    compiled = state_after(one, times, plain=False, monkeypatch=monkeypatch)
+    assert state_after(one, times, plain=True, monkeypatch=monkeypatch) == compiled
+
+
+@compiled_only
+def test_motors_abreast_get_the_verdicts_that_each_gets_alone() -> None:
+    """Lost moves among them: the arithmetic is the same, operation by operation."""
+    base, random = rig(), np.random.default_rng(7)
+    rigs = [
+        changed(base, inertia=random.uniform(0.3, 6), inductance=random.uniform(0.8, 1.3), voltage=random.uniform(0.5, 1.5))
+        for _ in range(37)
+    ]
+    times = ramped(400, 500, 7000)
+    found = judge(times, rigs)
+    assert found == [simulate(times, one).verdict for one in rigs]
+    assert 0 < sum(verdict.lost for verdict in found) < len(rigs)
+
+
+@pytest.mark.parametrize("decay", ["slow", "voltage"])
+def test_abreast_knows_the_other_drives(decay: str) -> None:
+    base = Rig(SMALL, Drive(24, 1.0, HALF, decay), rig().load)  # type: ignore[arg-type]
+    rigs = [changed(base, inertia=factor, resistance=2 - factor) for factor in (0.8, 1.0, 1.3)]
+    times = even(400, 60)
+    alone = []
+    for one in rigs:
+        alone.append(simulate(times, one).verdict)
+    assert judge(times, rigs) == alone
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 7])
+def test_a_run_may_be_cut_anywhere(pieces: int) -> None:
+    one, times, end = rig(), ramped(60, 300, 1200), 100 * MS
+    whole, parts = Rotor(one, Sequencer(one.drive)), Rotor(one, Sequencer(one.drive))
+    whole.run(Sequencer(one.drive).pulses(times, 1), end)
+    sequencer, taken = Sequencer(one.drive), 0
+    for piece in range(1, pieces + 1):
+        until = end * piece // pieces
+        ready = int(np.searchsorted(times, until, side="right"))
+        changes = sequencer.pulses(times[taken:ready], 1) if ready > taken else sequencer.up_to(until)
+        parts.run(changes, until)
+        taken = ready
+    assert parts.s.tolist() == whole.s.tolist()
+    assert parts.n[: kernel.STEP].tolist() == whole.n[: kernel.STEP].tolist()
+
+
+def test_its_own_sine_and_exponential_are_exact_to_the_last_digits() -> None:
+    """A free current decays by exp(-R t / L), and the torque on a held rotor is a sine of its angle."""
+    heavy = SMALL.changed(inertia=1e3)
+    one = Rig(heavy, Drive(24, 1.0, FULL))
+    for angle in np.linspace(-700, 900, 23):
+        rotor = Rotor(one, Sequencer(one.drive))
+        rotor.s[kernel.X] = angle
+        rotor.run(Sequencer(one.drive).up_to(0), 20 * US)
+        s = rotor.s
+        torque = heavy.torque_constant * (s[kernel.IB] * cos(angle) - s[kernel.IA] * sin(angle))
+        assert s[kernel.ACC] * 1e3 == pytest.approx(torque, abs=1e-12)
+    rotor = Rotor(one, Sequencer(one.drive))
+    par = rotor.parameters
+    par[kernel.GAIN] = 0.0  # a voltage drive that gives nothing
+    rotor.n[kernel.MODE] = 2
+    rotor.run(Sequencer(one.drive).up_to(0), 2 * MS)
+    assert rotor.s[kernel.IA] == pytest.approx(exp(-2e-3 * heavy.resistance / heavy.inductance), rel=1e-12)
+
+
+def test_the_step_of_the_integrator_is_fine_enough() -> None:
+    """20 us against 1 us: within 0.1 electrical degrees at the end of a move."""
+    times = ramped(300, 300, 1500)
+    ends = [simulate(times, Rig(SMALL, Drive(24, 1.0, HALF), rig().load, h), sample=0).trace[-1, 1] for h in (20 * US, US)]
+    assert abs(ends[0] - ends[1]) < 0.1 * pi / 180
+
+
+def test_plain_python_refuses_what_would_take_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(engine, "fast", lambda: False)
+    with pytest.raises(MotorError, match=r"pip install 'detent\[fast\]'"):
+        simulate(even(100, 10_000), rig())
+    assert not simulate(even(100, 3), rig()).verdict.lost
+    assert judge(even(100, 3), [rig(), rig()]) == [simulate(even(100, 3), rig()).verdict] * 2
+
+
+CUDA = """
+import numpy as np
+from numba import cuda
+from detent.motors import kernel
+from detent.motors.excitation import Sequencer
+from detent.motors.rotor import Rotor
+from tests.motors.moves import even, rig
+
+step = cuda.jit(device=True)(kernel.advance)
+
+@cuda.jit
+def motors(s, n, times, places, levels, rows, modes, until, a, b, par, by_time, by_position, trace, substep):
+    k = cuda.grid(1)
+    if k < s.shape[0]:
+        step(s[k], n[k], times, places, levels, rows, modes, until, a, b, par, by_time, by_position, -1e300, 1e300, trace, substep)
+
+one, times, until = rig(), even(700, 6), 12_000_000
+plain = Rotor(one, Sequencer(one.drive))
+s, n = np.array([plain.s] * 3), np.array([plain.n] * 3)
+changes = Sequencer(one.drive).pulses(times, 1)
+kernel_run = motors[1, 4]
+kernel_run(s, n, *changes, until, one.table_a, one.table_b, one.parameters, one.by_time, one.by_position, np.zeros((0, 6)), one.substep)
+plain.run(changes, until)
+assert (s == plain.s).all() and (n == plain.n).all(), (s - plain.s)
+print("same")
+"""
+
+
+@compiled_only
+def test_the_kernel_is_a_thread_of_a_gpu_in_the_cuda_simulator() -> None:
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", CUDA], capture_output=True, text=True, check=False,
+        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    if "No module named 'numba.cuda'" in done.stderr:
+        pytest.skip("numba has no CUDA target here: install numba-cuda")
+    assert done.stdout == "same\n", done.stderr
+
+
