@@ -130,15 +130,17 @@ def test_the_belt_stops_one_ramp_behind_each_mark() -> None:
     assert positions(cell) == {"belt": belt.position(cell.now)}
 
 
-class TestAssembly:
-    @pytest.fixture(scope="class")
-    def assembled(self) -> Cell:
-        cell = example("assembly")
-        port = HostPort(cell)
-        script = runpy.run_path(str(EXAMPLES / "assembly" / "pick_and_place.py"))
-        script["pick_and_place"](Ccu(port, port.wait), port.wait)
-        return cell
+@pytest.fixture(scope="module")
+def assembled() -> Cell:
+    """The cell of the seven drives behind its whole program."""
+    cell = example("assembly")
+    port = HostPort(cell)
+    script = runpy.run_path(str(EXAMPLES / "assembly" / "pick_and_place.py"))
+    script["pick_and_place"](Ccu(port, port.wait), port.wait)
+    return cell
 
+
+class TestAssembly:
     def test_the_seven_drives_of_the_robot_find_their_origins_and_come_home_again(self, assembled: Cell) -> None:
         assert len(positions(assembled)) == 7
         assert set(positions(assembled).values()) == {0}

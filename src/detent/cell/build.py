@@ -482,8 +482,13 @@ class _Builder:
             raise self.problem(where, f"cannot read {file}: {reason or error}") from None
         try:
             return assemble(catalogue.language(unit.model), text, file)
-        except (AssemblyFailed, CatalogueError) as error:
+        except CatalogueError as error:
             raise self.problem(where, str(error)) from None
+        except AssemblyFailed as error:
+            first, more = error.errors[0], len(error.errors) - 1
+            rest = f" (and {more} more: detent list {unit.model} {file})" if more else ""
+            message = f"{file}:{first.line}:{first.column}: {first.message}{rest}"
+            raise self.problem(where, message) from None
 
     # -- names -------------------------------------------------------------------------------------------
 

@@ -64,6 +64,15 @@ class Wiring(NamedTuple):
         return self
 
 
+class Outside(NamedTuple):
+    """What a cell reaches for outside: its copies reach for the same."""
+
+    store: Store
+
+    def __deepcopy__(self, _: object) -> "Outside":
+        return self
+
+
 class Script(tuple[Action, ...]):
     """Actions in order of time. Immutable, and shared by copies of a cell."""
 
@@ -97,7 +106,7 @@ class Cell:
         self.nets = list(nets)
         self.lines = list(lines)
         self.now: Ns = 0
-        self.store = store
+        self._outside = Outside(store)
         self.recording: Recording | None = Recording(wiring.names[: wiring.units]) if record else None
         self.journal: Log[Action] = Log()  # what was done from outside, if the cell records: see `replay`
         self.journaling = False  # from the moment on when the cell is built
@@ -301,7 +310,7 @@ class Cell:
                     self.parts[follower].follow(item)  # type: ignore[attr-defined]
                     self._touched.add(follower)
             elif kind is StoreImage:
-                ok = self.store(self.wiring.names[index], item.image)  # type: ignore[union-attr]
+                ok = self._outside.store(self.wiring.names[index], item.image)  # type: ignore[union-attr]
                 self.parts[index].stored(ok, self.now)
                 self._touched.add(index)
             elif kind is Powered and not item.on:  # type: ignore[union-attr]
@@ -351,11 +360,19 @@ class Cell:
                 for unit, port in units:
                     self.parts[unit].set_pin(port, LOW, at)
                     self._touched.add(unit)
+            places = {arrival.place for arrival in arrived}
+            if not places:
+                continue
+            heard = [arrival.sent for arrival in arrived]
+            chars = [sent.char for sent in heard]
             for place, (unit, port) in enumerate(units):
-                if heard := [arrival.sent for arrival in arrived if arrival.place in (place, EVERYBODY)]:
+                if places != _ALL:  # not everything is for everybody
+                    heard = [arrival.sent for arrival in arrived if arrival.place in (place, EVERYBODY)]
+                    chars = [sent.char for sent in heard]
+                if chars:
                     if self.recording is not None:
                         self.recording.extend(unit, [Received(s.done, port, s.char, s.at) for s in heard])
-                    self.parts[unit].receive(port, [sent.char for sent in heard], at)
+                    self.parts[unit].receive(port, chars, at)
                     self._touched.add(unit)
         self._plan_lines()
         self._settle()
@@ -377,4 +394,5 @@ class Cell:
             self._advance(self.now)
 
 
+_ALL = {EVERYBODY}
 _MOTION = (MotionStarted, MotionCut, MotionEnded)

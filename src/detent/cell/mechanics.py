@@ -7,7 +7,7 @@ on when it was asked: a look ahead that proves wrong, because a motion changed i
 """
 
 from collections.abc import Sequence
-from copy import copy
+from copy import copy, deepcopy
 from math import ceil, floor, inf
 from typing import Any, NamedTuple
 
@@ -187,6 +187,7 @@ class Mechanics:
         sequencer = Sequencer(rig.drive)
         rotor = Rotor(rig, sequencer, 0, SAMPLE)
         self._course = Course(rotor, sequencer)
+        self._first = self._row(rotor, 0)  # of the trace
         self._ahead: Course | None = None  # as far as a look ahead has come without finding anything
         self._watched: set[str] = set()
         self._inputs: dict[str, Level] = {pin.name: HIGH for pin in PINS if pin.kind.reads}
@@ -204,8 +205,8 @@ class Mechanics:
 
     # -- where it is ---------------------------------------------------------------------------------------
 
-    def place_of(self, angle: float) -> float:
-        """The place on the axis, in steps, of an electrical angle."""
+    def place_of(self, angle: Any) -> Any:
+        """The place on the axis, in steps, of an electrical angle (or an array of them)."""
         winding = self.rig.drive.winding
         return self.shaft + self.sign * (angle - winding.offset) / winding.pitch
 
@@ -232,6 +233,20 @@ class Mechanics:
         course = self._course.twin()
         course.go(now)
         return self.shaft + self.sign * course.sequencer.place
+
+    def traced(self, now: Ns) -> Floats:
+        """Everything that was sampled up to `now` (columns as in `kernel`). Only of a cell that records."""
+        log = deepcopy(self.trace)
+        assert log is not None
+        course = self._course.twin()
+        course.go(now, trace=log)
+        rows = [self._first, *log, self._row(course.rotor, now)]
+        return np.concatenate(rows)
+
+    def _row(self, rotor: Rotor, at: Ns) -> Floats:
+        s = rotor.s
+        phi = self.rig.drive.winding.angle(int(rotor.n[kernel.PLACE]))
+        return np.array([[at, s[kernel.X], s[kernel.W], s[kernel.IA], s[kernel.IB], phi]], np.float64)
 
     # -- the contract of a device ----------------------------------------------------------------------------
 

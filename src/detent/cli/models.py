@@ -52,7 +52,7 @@ Rows = list[dict[str, Any]]
 def _tables(model: "Model") -> dict[str, Rows]:
     """The model's tables: rows of named columns, everything as it is printed."""
     levels = {0: "low", 1: "open"}
-    tables: dict[str, Rows] = {
+    return {
         "pins": [
             {"pin": pin.name, "number": pin.number, "kind": pin.kind.value, "what": pin.help} for pin in model.pins
         ],
@@ -60,13 +60,14 @@ def _tables(model: "Model") -> dict[str, Rows]:
         "options": [{"option": o.name, "takes": o.takes, "default": o.default, "what": o.help} for o in model.options],
         "commands": [row._asdict() for row in model.commands()],
     }
-    return {title: rows for title, rows in tables.items() if rows}
 
 
 def reference(model: "Model") -> str:
     """The tables in Markdown."""
     text = []
     for title, rows in _tables(model).items():
+        if not rows:
+            continue
         columns = list(rows[0])
         text.append(f"### {title.capitalize()} of the {model.name.upper()}\n")
         text.append("| " + " | ".join(columns) + " |")
@@ -85,6 +86,8 @@ def _print_tables(model: "Model") -> None:
     console = Console()
     console.print(f"[bold]{model.name}[/bold]  {model.title}", highlight=False)
     for title, rows in _tables(model).items():
+        if not rows:
+            continue
         table = Table(title=title.capitalize(), title_justify="left", box=None, pad_edge=False, header_style="dim")
         for column in rows[0]:
             if column != "section":

@@ -192,9 +192,9 @@ def _write(
 
         arrays.write(npz, seen)
     if plot is not None:
-        from detent.outputs import figures
+        from detent.outputs import figures, rotors
 
-        figures.write(plot, seen, title=described.title or target.name)
+        figures.write(plot, seen, title=described.title or target.name, rotors=rotors.of_cell(cell))
 
 
 def result(cell: "Cell", ended: str, exchanges: list[Exchange]) -> dict[str, object]:

@@ -144,7 +144,18 @@ def _print_ready(service: "Service", description: "Description", folder: Path, p
     longest = max(len(command) for _, command in commands)
     for endpoint, command in commands:
         print(f"  {endpoint.unit:{width}}  {command:{longest}}  # {_what(endpoint)}")
+    for hint in _hints(description):
+        print(hint)
     print("Ctrl-C ends it.", flush=True)
+
+
+def _hints(description: "Description") -> list[str]:
+    """What a person who types by hand should know of the models that are served."""
+    from detent.controllers import catalogue
+
+    models = dict.fromkeys(unit.model for unit in description.units.values())
+    hints = [catalogue.MODELS[model].by_hand for model in models if model in catalogue.MODELS]
+    return [hint for hint in dict.fromkeys(hints) if hint]
 
 
 def _straps(description: "Description") -> list[tuple[str, str]]:

@@ -30,7 +30,9 @@ def table(
     option: bool = False,
     json: bool = False,
 ) -> None:
-    """Compile a curve V(t) into the table of differences of a SUPERSIGMA drive. Without arguments: the paper's.
+    """Compile a curve into the table of differences of a SUPERSIGMA drive.
+
+    Without arguments it is the paper's table.
 
     Parameters
     ----------

@@ -74,6 +74,7 @@ class Model(NamedTuple):
     told_apart_by: str = ""  # the option, an attribute of the controller too, in which units of one line must differ
     answered: Callable[[str], bool] = lambda text: True  # whether a host gets an answer to a command line
     limits: Limits = NO_LIMITS
+    by_hand: str = ""  # a line for people who type to it on a terminal
 
 
 def unknown(kind: str, name: str, known: Sequence[str]) -> CatalogueError:
@@ -236,6 +237,7 @@ def _gsc200(name: str, options: tuple[Option, ...]) -> Model:
         lambda: gsc200_commands.reference(name),
         gsc200_pins.strap_line,
         limits=Limits(gsc200_pins.SUPPLY_V, gsc200_pins.LOADS_A),
+        by_hand="To type by hand, strap the checksum off: CHS=low. Lines end with CR (Ctrl-M, or Enter in picocom).",
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from detent.outputs import curves
 from detent.outputs.curves import Band
 from detent.outputs.files import write_whole
+from detent.outputs.rotors import RotorTrace
 from detent.outputs.signals import Signals, UnitSignals
 from detent.outputs.waves import UNKNOWN
 from detent.ticks import MS, SECOND, US, Ns
@@ -68,14 +69,21 @@ def check(path: Path) -> None:
         raise ValueError(f"{path}: a figure is one of {', '.join(FORMATS)}, not {shown}: choose another file name")
 
 
-def write(path: Path, signals: Signals, *, title: str = "", lanes: Sequence[Pin | Strip] | None = None) -> None:
+def write(
+    path: Path,
+    signals: Signals,
+    *,
+    title: str = "",
+    lanes: Sequence[Pin | Strip] | None = None,
+    rotors: Sequence[RotorTrace] = (),
+) -> None:
     """Draw a run into a .png, .svg or .pdf file, whole or not at all.
 
     ValueError for another suffix, KeyError for a lane that is none, ImportError without matplotlib, OSError if
     the file cannot be written.
     """
     check(path)
-    figure = timeline_figure(signals, title=title, lanes=lanes)
+    figure = timeline_figure(signals, title=title, lanes=lanes, rotors=rotors)
     data = BytesIO()
     with style():
         kind = path.suffix.lower()[1:]
@@ -86,7 +94,13 @@ def write(path: Path, signals: Signals, *, title: str = "", lanes: Sequence[Pin 
     write_whole(path, data.getvalue())
 
 
-def timeline_figure(signals: Signals, *, title: str = "", lanes: Sequence[Pin | Strip] | None = None) -> "Figure":
+def timeline_figure(
+    signals: Signals,
+    *,
+    title: str = "",
+    lanes: Sequence[Pin | Strip] | None = None,
+    rotors: Sequence[RotorTrace] = (),
+) -> "Figure":
     """A figure of the whole run.
 
     `lanes` from top to bottom; None: the programs, and the pins that change (`chosen_lanes`). KeyError for a
@@ -96,7 +110,7 @@ def timeline_figure(signals: Signals, *, title: str = "", lanes: Sequence[Pin | 
         from matplotlib.figure import Figure
 
         chosen = chosen_lanes(signals) if lanes is None else list(lanes)
-        return _Timeline(Figure, signals, chosen).draw(title)
+        return _Timeline(Figure, signals, chosen, rotors).draw(title)
 
 
 def chosen_lanes(signals: Signals) -> list[Pin | Strip]:
@@ -144,19 +158,20 @@ _SETTINGS = {
 class _Timeline:
     """One figure being drawn."""
 
-    def __init__(self, figure: "type[Figure]", signals: Signals, lanes: Sequence[Pin | Strip]) -> None:
-        self.signals, self.lanes = signals, lanes
+    def __init__(self, figure: "type[Figure]", signals: Signals, lanes: Sequence[Pin | Strip],
+                 rotors: Sequence[RotorTrace] = ()) -> None:  # fmt: skip
+        self.signals, self.lanes, self.rotors = signals, lanes, rotors
         self.colours = {unit.name: COLOURS[n % len(COLOURS)] for n, unit in enumerate(signals.units)}
         self.until = max(signals.until, 1)
         self.scale, self.time_unit = _time_unit(self.until)
         moving = [unit for unit in signals.units if unit.moves]
         self.axes_units = moving
         lanes_height = LANE * len(lanes) + LANES_GAP if lanes else 0
-        fixed = TOP + BOTTOM + lanes_height + len(moving) * (GAP + BLOCK_GAP)
-        panels = len(moving) * (POSITION + SPEED)
+        fixed = TOP + BOTTOM + lanes_height + (len(moving) + len(rotors)) * (GAP + BLOCK_GAP)
+        panels = (len(moving) + len(rotors)) * (POSITION + SPEED)
         stretch = min(max((LEAST_HEIGHT - fixed) / panels, 1.0), MOST_STRETCH) if panels else 1.0
         self.position, self.speed = round(POSITION * stretch), round(SPEED * stretch)
-        self.height = fixed + len(moving) * (self.position + self.speed)
+        self.height = fixed + (len(moving) + len(rotors)) * (self.position + self.speed)
         self.columns = WIDTH - LEFT - RIGHT - STUB
         self.horizon = self.until * (WIDTH - LEFT - RIGHT) / self.columns
         self.figure = figure(figsize=(WIDTH / DPI, self.height / DPI), dpi=DPI)
@@ -171,6 +186,9 @@ class _Timeline:
             axes = self.position_panel(unit)
             self.top -= GAP
             axes = self.speed_panel(unit)
+            self.top -= BLOCK_GAP
+        for rotor in self.rotors:
+            axes = self.rotor_panels(rotor)
             self.top -= BLOCK_GAP
         if self.lanes:
             axes = self.lanes_panel()
@@ -228,6 +246,26 @@ class _Timeline:
         else:
             axes.set_yticks([0])
             axes.text(0.5, 0.75, "no step pulses", transform=axes.transAxes, ha="center", va="center", color=GREY)
+        return axes
+
+    def rotor_panels(self, rotor: RotorTrace) -> "Axes":
+        """Where the rotor of a motor is, where it should be, and the currents of its phases."""
+        self.text(24, self.top - 14, rotor.name, fontsize=14, fontweight="bold", color=INK)
+        axes = self.panel(self.position)
+        self.text(24, self.top + self.position - 38, "rotor (steps)", color=GREY)
+        self.text(24, self.top + self.position - 54, "grey: command", color=GREY)
+        times = rotor.times / self.scale
+        axes.plot(times, rotor.commands, color=PALE, drawstyle="steps-post", linewidth=1.2)
+        axes.plot(times, rotor.places, color=INK, linewidth=0.9)
+        _limits(axes, np.concatenate((rotor.places, rotor.commands)))
+        _whole_ticks(axes, 5)
+        end = float(rotor.places[-1])
+        self.beside(axes, end, _number(round(end, 2)), INK, "at the end")
+        self.top -= GAP
+        axes = self.panel(self.speed)
+        self.text(24, self.top + self.speed - 18, "phase currents (A)", color=GREY)
+        for current, colour in ((rotor.current_a, COLOURS[2]), (rotor.current_b, COLOURS[1])):
+            axes.plot(times, current, color=colour, linewidth=0.5)
         return axes
 
     def lanes_panel(self) -> "Axes":

@@ -23,6 +23,9 @@ from detent.ramps.table_movement import Movement, constant, ramped
 NEVER = int(np.iinfo(np.int64).max)  # a movement that is not to be had
 
 
+COARSE = 64  # first N's between two that are tried for the end of a family
+
+
 class Way(Enum):
     """How the ramps of a short movement are chosen."""
 
@@ -115,9 +118,9 @@ def family(table: Differences, entries: int) -> Profiles:
     From the table's own to the slowest that can be of use: one whose steps constant low speed does in less time.
     """
     idle = 2 * entries * table.interval // (table.first + 1)  # pulses at low speed in the time of two ramps
-    last, step = table.first, 256
-    while last < LARGEST_N and 2 * int(profiles(table, [Ramp(last, entries)]).up[0]) > idle:
-        last = min(last + step, LARGEST_N)
+    coarse = range(table.first, LARGEST_N + 1, COARSE)
+    slow = np.flatnonzero(2 * profiles(table, [Ramp(first, entries) for first in coarse]).up <= idle)
+    last = coarse[int(slow[0])] if len(slow) else LARGEST_N
     return profiles(table, [Ramp(first, entries) for first in range(table.first, last + 1)])
 
 
