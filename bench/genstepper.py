@@ -1,4 +1,4 @@
-"""What the longest move of a GenStepper board costs beside a short one: planned, run and queried, in time and memory."""
+"""What a long move of a GenStepper board costs beside a short one: planned, run and queried, in time and memory."""
 
 import tracemalloc
 from functools import partial

@@ -18,6 +18,7 @@ from detent.cell.description import single
 from detent.cell.parts import PARTS as CELL_PARTS
 from detent.cli.models import reference
 from detent.controllers import catalogue
+from detent.controllers.genstepper import commands as genstepper_commands
 from detent.controllers.gsc200 import commands, pins, program
 from detent.controllers.gsc200.commands import GS_C200, GS_C200S, Instruction, Op, Row
 from detent.controllers.gsc200.link import LONGEST
@@ -305,6 +306,29 @@ def movement_times() -> str:
     return table(("half steps", "hyperbola (N0)", "exact (N0)", "free (entries)", "constant low speed"), rows)
 
 
+# -- of the BS0610 and BS0710 --------------------------------------------------------------------------------
+
+
+def board_section(title: str) -> str:
+    """A table of the BS0610 without its heading."""
+    return section("bs0610", title).partition("\n")[2]
+
+
+def board_reports() -> str:
+    """The reports of `?`."""
+    return table(("report", "what"), ((f"`{found.number}`", found.what) for found in genstepper_commands.REPORTS))
+
+
+def board_actions() -> str:
+    """The values of report -8."""
+    return table(("-8", "step action"), enumerate(genstepper_commands.ACTIONS))
+
+
+def board_memory() -> str:
+    """The memory locations."""
+    return table(("address", "what"), genstepper_commands.MEMORY)
+
+
 PARTS: Final[dict[str, Callable[[], str]]] = {
     "addresses": addresses,
     "baud rates": rates,
@@ -327,6 +351,13 @@ PARTS: Final[dict[str, Callable[[], str]]] = {
     "op-codes of the drive": lambda: drive_section("Commands"),
     "flags of the drive": flags,
     "times of the drive": movement_times,
+    "pins of the boards": lambda: board_section("Pins"),
+    "straps of the boards": lambda: board_section("Straps"),
+    "options of the boards": lambda: board_section("Options"),
+    "commands of the boards": lambda: board_section("Commands"),
+    "reports of the boards": board_reports,
+    "step actions of the boards": board_actions,
+    "memory of the boards": board_memory,
 }
 
 if __name__ == "__main__":

@@ -70,11 +70,11 @@ def draw_times(found: Times, path: Path) -> None:
             upper.plot(found.steps, values, color=COLOURS[name], lw=1.2, label=words[name])
         upper.set(ylim=(0, 0.85), ylabel="time of the movement (s)")
         upper.legend(loc="lower right", frameon=False)
-        for x, text in ((shortest(PAPER, OFFSET), "very short"), (5144, "long")):
+        for x, text in ((shortest(PAPER, OFFSET), "very short: below"), (5144, "long: from")):
             for axes in (upper, lower):
                 axes.axvline(x, color="#bbbbbb", lw=0.8, zorder=0)
-            upper.annotate(f"{text}: {'below' if text == 'very short' else 'from'} {x}", (x, 0.74), (14, 0),
-                           textcoords="offset points", va="top", fontsize=8, color="#666666")  # fmt: skip
+            place = (14 if x < LAST / 2 else 4, 0)
+            upper.annotate(f"{text} {x}", (x, 0.74), place, textcoords="offset points", va="top", fontsize=8)
         gain = (found.ways["hyperbola"] - found.ways["exact"]) * 1e3
         lower.plot(found.steps, gain, color=COLOURS["exact"], lw=0.7)
         lower.set(xlabel="length of the movement (half steps)", ylabel="gain of the\nbest N0 (ms)", xlim=(0, LAST))
@@ -97,9 +97,8 @@ def draw_family(path: Path) -> None:
             t = np.linspace(0, made.clocks * 500 - 1, 600).astype(np.int64)
             rate = [made.train.state_at(int(each)).rate for each in t]
             left.plot(t / 1e9, rate, lw=1.1, color="#0072B2")
-            left.annotate(
-                str(first), (t[300] / 1e9, max(rate)), (0, 3), textcoords="offset points", ha="center", fontsize=7
-            )
+            above = (0, 3) if first < MEMBERS[-1] else (0, -10)
+            left.annotate(str(first), (0.3, max(rate)), above, textcoords="offset points", ha="center", fontsize=7)
         left.set(xlabel="time (s)", ylabel="speed (half steps/s)", title="the family of figure 10, by N0")
         members = family(PAPER, ENTRIES)
         right.plot(members.first, members.up, color="#D55E00", lw=2, label="steps of the ramp, na")

@@ -77,9 +77,11 @@ class Connection:
         self._socket = socket.create_connection((host, port), timeout=5)
 
     def write(self, data: bytes) -> None:
+        """Send `data`."""
         self._socket.sendall(data)
 
     def read(self, count: int) -> bytes:
+        """The next `count` bytes."""
         data = b""
         while len(data) < count and (more := self._socket.recv(count - len(data))):
             data += more
@@ -87,6 +89,7 @@ class Connection:
 
 
 def main() -> None:
+    """Choose by the argument."""
     host, colon, port = (sys.argv[1] if len(sys.argv) > 1 else "").rpartition(":")
     if colon:
         pick_and_place(Ccu(Connection(host, int(port)), time.sleep), time.sleep)

@@ -375,7 +375,12 @@ def disassemble(language: Language[Ins], image: bytes) -> str:
     starts = {address for address, _ in decoded}
     targets = {target for _, instruction in decoded if (target := language.target(instruction)) is not None}
     lines = []
+    here = language.areas[0].start
+    origin = getattr(language, "origin", None)  # of those whose programs may have gaps
     for address, instruction in decoded:
+        if origin is not None and address != here:
+            lines.append(origin(address))
+        here = address + language.length(instruction)
         if address in targets:
             lines.append(f"at_{address}:")
         target = language.target(instruction)

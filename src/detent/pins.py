@@ -25,6 +25,7 @@ class PinKind(Enum):
     OPEN_COLLECTOR = "open collector"  # pulls to 0 or lets go; the net's pull-up makes it 1
     WINDING = "winding"  # push-pull, feeds a motor; its level is told only if a wire leads to another device
     SERIAL = "serial"  # carries characters, belongs to a line
+    BUS = "bus"  # carries characters on several wires at once, belongs to a line
     SUPPLY = "supply"  # power in or out, ground, not connected
 
     @property

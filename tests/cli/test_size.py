@@ -32,14 +32,21 @@ def test_page_66_a_single_supply_feeds_the_logic_too_and_two_motors_double_the_c
 @pytest.mark.parametrize(
     ("question", "warning"),
     [
-        (Question(12, 30, 3), "worked example"), (Question(12, 10), "product failure"), (Question(12, 25), "fan must be used"),
-        (Question(24, 100), "above 15 V"), (Question(24, 100), "SS is 6.5 to 15 V"), (Question(40, 100, supply="DS"), "4.5 to 34"),
-        (Question(7, 100), "7.5 to 15 V"), (Question(12, 100, logic_voltage=7), "nothing is to be connected"),
-        (Question(12, 100, supply="DS"), "DS needs"), (Question(12, 100, supply="DS", logic_voltage=16), "DS needs"),
-        (Question(12, 100, supply="5VO", logic_voltage=6), "exactly 5 V"), (Question(12, 100, tap=0.2), "fan cooled"),
+        (Question(12, 30, 3), "worked example"),
+        (Question(12, 10), "product failure"),
+        (Question(12, 25), "fan must be used"),
+        (Question(24, 100), "above 15 V"),
+        (Question(24, 100), "SS is 6.5 to 15 V"),
+        (Question(40, 100, supply="DS"), "4.5 to 34"),
+        (Question(7, 100), "7.5 to 15 V"),
+        (Question(12, 100, logic_voltage=7), "nothing is to be connected"),
+        (Question(12, 100, supply="DS"), "DS needs"),
+        (Question(12, 100, supply="DS", logic_voltage=16), "DS needs"),
+        (Question(12, 100, supply="5VO", logic_voltage=6), "exactly 5 V"),
+        (Question(12, 100, tap=0.2), "fan cooled"),
         (Question(12, 100, tap=0.6), "500 mA"),
     ],
-)  # fmt: skip
+)
 def test_it_warns_as_the_manual_does(question, warning):
     assert any(warning in told for told in size(question).warnings)
 
@@ -52,8 +59,17 @@ def test_what_is_within_limits_is_not_warned_of():
     )
 
 
-@pytest.mark.parametrize("wrong", [Question(0, 1), Question(1, 0), Question(1, 1, 4), Question(1, 1, motors=3),
-                                   Question(1, 1, supply="XX"), Question(1, 1, motors=2, double_current=True)])  # fmt: skip
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        Question(0, 1),
+        Question(1, 0),
+        Question(1, 1, 4),
+        Question(1, 1, motors=3),
+        Question(1, 1, supply="XX"),
+        Question(1, 1, motors=2, double_current=True),
+    ],
+)
 def test_what_is_no_supply_is_an_error(wrong):
     with pytest.raises(ValueError, match=r"."):
         size(wrong)
@@ -79,9 +95,19 @@ def test_the_verb_lists_pages_questions_and_answers(capsys):
     assert (facts["page"], facts["voltage_v"], facts["winding_a"]) == ("bs0710", 6, 0.5)
 
 
-@pytest.mark.parametrize("words", [["bs061"], ["bs0610", "voltage"], ["bs0610", "volts=3"], ["bs0610", "voltage=x", "resistance=1"],
-                                   ["bs0610", "voltage=12"], ["bs0610", "resistance=12"], ["bs0610", "voltage=0", "resistance=1"],
-                                   ["bs0610", "voltage=1", "resistance=1", "supply=AB"]])  # fmt: skip
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["bs061"],
+        ["bs0610", "voltage"],
+        ["bs0610", "volts=3"],
+        ["bs0610", "voltage=x", "resistance=1"],
+        ["bs0610", "voltage=12"],
+        ["bs0610", "resistance=12"],
+        ["bs0610", "voltage=0", "resistance=1"],
+        ["bs0610", "voltage=1", "resistance=1", "supply=AB"],
+    ],
+)
 def test_a_wrong_question_ends_with_2_and_a_remedy(words, capsys):
     assert run(*words) == 2
     assert capsys.readouterr().err

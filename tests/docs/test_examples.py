@@ -48,7 +48,10 @@ def pulses(cell: Cell, unit: str) -> list[Ns]:
 
 
 def test_no_example_is_without_a_test() -> None:
-    tested = {"assembly", "closed-loop", "drilling", "homing", "menu", "multipoint", "synchronised", "velocity"}
+    tested = {
+        "assembly", "closed-loop", "drilling", "genstepper", "homing",
+        "menu", "multipoint", "synchronised", "velocity",
+    }  # fmt: skip
     assert {path.parent.name for path in EXAMPLES.glob("*/cell.toml")} == tested
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.motors.moves import SMALL, even, rig
 
 from detent.motors.curve import pull_out
 from detent.motors.drive import Currents, Drive
@@ -18,7 +19,6 @@ from detent.motors.rotor import Rig
 from detent.motors.variants import changed, judge
 from detent.motors.winding import HALF, microstep, winding
 from detent.pulses import Train, Uniform
-from tests.motors.moves import SMALL, even, rig
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, nan, inf, True, "5"])
@@ -42,7 +42,9 @@ def test_wrong_units_are_noticed() -> None:
 
 
 def test_a_supply_below_the_windings_need_is_refused_with_what_it_could_drive() -> None:
-    with pytest.raises(MotorError, match=r"4 V cannot drive 1 A through the 5.3 ohm.*needs 5.3 V.*lower the current to 0.755 A"):
+    with pytest.raises(
+        MotorError, match=r"4 V cannot drive 1 A through the 5.3 ohm.*needs 5.3 V.*lower the current to 0.755 A"
+    ):
         Rig(SMALL, Drive(4, 1.0, HALF))
     Rig(SMALL, Drive(4, 0.75, HALF))
     with pytest.raises(MotorError, match="nothing is left"):
@@ -113,7 +115,15 @@ def test_variants_must_share_what_the_pulses_go_through() -> None:
     st.floats(5, 200), st.sampled_from(["fast", "slow", "voltage"]), st.floats(20, 20_000), st.integers(1, 60),
 )  # fmt: skip
 def test_whatever_the_numbers_the_verdict_is_one(
-    ohm: float, henry: float, amps: float, torque: float, inertia: float, supply: float, decay: str, rate: float, count: int
+    ohm: float,
+    henry: float,
+    amps: float,
+    torque: float,
+    inertia: float,
+    supply: float,
+    decay: str,
+    rate: float,
+    count: int,
 ) -> None:
     try:
         made = Motor("some", ohm, henry, amps, torque, inertia)
@@ -124,5 +134,3 @@ def test_whatever_the_numbers_the_verdict_is_one(
     assert isfinite(verdict.load_angle)
     assert isfinite(verdict.error)
     assert verdict.lost == (verdict.load_angle > 360 or verdict.slip != 0)
-
-

@@ -7,6 +7,7 @@ from math import cos, exp, pi, sin
 
 import numpy as np
 import pytest
+from tests.motors.moves import SMALL, even, ramped, rig
 
 from detent.motors import engine, kernel
 from detent.motors.drive import Drive
@@ -17,7 +18,6 @@ from detent.motors.rotor import Rig, Rotor
 from detent.motors.variants import changed, judge
 from detent.motors.winding import FULL, HALF
 from detent.ticks import MS, US
-from tests.motors.moves import SMALL, even, ramped, rig
 
 compiled_only = pytest.mark.skipif(not engine.fast(), reason="numba is not installed")
 
@@ -45,7 +45,9 @@ def test_motors_abreast_get_the_verdicts_that_each_gets_alone() -> None:
     """Lost moves among them: the arithmetic is the same, operation by operation."""
     base, random = rig(), np.random.default_rng(7)
     rigs = [
-        changed(base, inertia=random.uniform(0.3, 6), inductance=random.uniform(0.8, 1.3), voltage=random.uniform(0.5, 1.5))
+        changed(
+            base, inertia=random.uniform(0.3, 6), inductance=random.uniform(0.8, 1.3), voltage=random.uniform(0.5, 1.5)
+        )
         for _ in range(37)
     ]
     times = ramped(400, 500, 7000)
@@ -103,7 +105,9 @@ def test_its_own_sine_and_exponential_are_exact_to_the_last_digits() -> None:
 def test_the_step_of_the_integrator_is_fine_enough() -> None:
     """20 us against 1 us: within 0.1 electrical degrees at the end of a move."""
     times = ramped(300, 300, 1500)
-    ends = [simulate(times, Rig(SMALL, Drive(24, 1.0, HALF), rig().load, h), sample=0).trace[-1, 1] for h in (20 * US, US)]
+    ends = [
+        simulate(times, Rig(SMALL, Drive(24, 1.0, HALF), rig().load, h), sample=0).trace[-1, 1] for h in (20 * US, US)
+    ]
     assert abs(ends[0] - ends[1]) < 0.1 * pi / 180
 
 
@@ -129,15 +133,16 @@ step = cuda.jit(device=True)(kernel.advance)
 def motors(s, n, times, places, levels, rows, modes, until, a, b, par, by_time, by_position, trace, substep):
     k = cuda.grid(1)
     if k < s.shape[0]:
-        step(s[k], n[k], times, places, levels, rows, modes, until, a, b, par, by_time, by_position, -1e300, 1e300, trace, substep)
+        step(s[k], n[k], times, places, levels, rows, modes, until, a, b, par, by_time, by_position, -1e300, 1e300,
+        trace, substep)
 
 one, times, until = rig(), even(700, 6), 12_000_000
 plain = Rotor(one, Sequencer(one.drive))
 s, n = np.array([plain.s] * 3), np.array([plain.n] * 3)
 changes = Sequencer(one.drive).pulses(times, 1)
 kernel_run = motors[1, 4]
-kernel_run(s, n, *changes, until, one.table_a, one.table_b, one.parameters, one.by_time, one.by_position, np.zeros((0, 6)), one.substep)
-plain.run(changes, until)
+kernel_run(s, n, *changes, until, one.table_a, one.table_b, one.parameters, one.by_time, one.by_position, np.zeros((0,
+6)), one.substep) plain.run(changes, until)
 assert (s == plain.s).all() and (n == plain.n).all(), (s - plain.s)
 print("same")
 """
@@ -152,5 +157,3 @@ def test_the_kernel_is_a_thread_of_a_gpu_in_the_cuda_simulator() -> None:
     if "No module named 'numba.cuda'" in done.stderr:
         pytest.skip("numba has no CUDA target here: install numba-cuda")
     assert done.stdout == "same\n", done.stderr
-
-

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.motors.moves import LARGE, SMALL, even, ramped, rig
 
 from detent.motors.curve import pull_out
 from detent.motors.drive import Drive
@@ -15,7 +16,6 @@ from detent.motors.rotor import Rig
 from detent.motors.winding import HALF
 from detent.pulses import Train, Uniform
 from detent.ticks import MS
-from tests.motors.moves import LARGE, SMALL, even, ramped, rig
 
 MOVE = ramped(400, 400, 2600)
 
@@ -34,7 +34,9 @@ def test_voltage_and_speed_scale_together() -> None:
 
 def test_time_may_run_twice_as_fast_for_a_motor_of_half_the_time_constants() -> None:
     """t / 2 with L / 2, Kt / 2 (per rad/s), J / 8: the same angles. The torque constant enters EMF and torque alike."""
-    quick = SMALL.changed(inductance=SMALL.inductance / 2, holding_torque=SMALL.holding_torque / 2, inertia=SMALL.rotor / 8)
+    quick = SMALL.changed(
+        inductance=SMALL.inductance / 2, holding_torque=SMALL.holding_torque / 2, inertia=SMALL.rotor / 8
+    )
     times = even(800, 200)
     once = simulate(times, Rig(SMALL, Drive(24, 1.0, HALF), Load(), 10_000), settle=20 * MS, sample=0)
     twice = simulate(times // 2, Rig(quick, Drive(24, 1.0, HALF), Load(), 5_000), settle=10 * MS, sample=0)
@@ -98,6 +100,7 @@ def test_a_torque_that_comes_up_on_the_way_loses_the_move_there(which: str) -> N
 @pytest.mark.parametrize("which", [SMALL, LARGE])
 def test_more_inertia_more_friction_less_voltage_never_help_a_hard_start(which: Motor) -> None:
     """Not a law at every speed (resonance), but at a start near the limit."""
+
     def lost(voltage: float, inertia: float) -> bool:
         one = Rig(which, Drive(24 * voltage, 1.0, HALF), Load(inertia=which.rotor * inertia, friction=0.01))
         return simulate(even(3200, 400), one, settle=0).verdict.lost

@@ -5,6 +5,7 @@ from math import atan2, cos, degrees, hypot, pi, sin, sqrt
 import numpy as np
 import numpy.typing as npt
 import pytest
+from tests.motors.moves import LARGE, SMALL, ramped
 
 from detent.motors import kernel
 from detent.motors.curve import pull_out, torque_curve
@@ -17,7 +18,6 @@ from detent.motors.named import CURVES
 from detent.motors.rotor import Rig
 from detent.motors.winding import FULL, HALF, HALF_COMPENSATED, WAVE, microstep
 from detent.ticks import MS, US
-from tests.motors.moves import LARGE, SMALL, ramped
 
 
 def frequency(run: Run, *, after_ms: float) -> float:
@@ -79,7 +79,9 @@ class TestV4PublishedCurves:
     def rms(which: Motor, **changes: float) -> float:
         curve = CURVES[which.name]
         changed = which.changed(**changes)
-        computed = torque_curve(changed, Drive(curve.supply, curve.current, HALF), [rate / 2 for rate, _ in curve.points])
+        computed = torque_curve(
+            changed, Drive(curve.supply, curve.current, HALF), [rate / 2 for rate, _ in curve.points]
+        )
         rest = [point.torque - torque for point, (_, torque) in zip(computed, curve.points, strict=True)]
         return float(np.sqrt(np.mean(np.square(rest)))) / which.holding_torque
 
@@ -135,7 +137,12 @@ class TestV8AnotherIntegrator:
         def rates(_: float, y: npt.NDArray[np.float64], va: float, vb: float) -> list[float]:
             x, w, ia, ib = y
             torque = kt * (ib * cos(x) - ia * sin(x)) - load.torque - load.viscous * w
-            return [p * w, torque / j, (va - ohm * ia + kt * w * sin(x)) / henry, (vb - ohm * ib - kt * w * cos(x)) / henry]
+            return [
+                p * w,
+                torque / j,
+                (va - ohm * ia + kt * w * sin(x)) / henry,
+                (vb - ohm * ib - kt * w * cos(x)) / henry,
+            ]
 
         s, _n = rig.at_rest(0, 1.0)
         y = np.array([s[kernel.X], 0.0, s[kernel.IA], s[kernel.IB]])

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from detent.ramps.curves import linear
 from detent.ramps.differences import PAPER, Differences, compiled
@@ -98,3 +100,22 @@ def test_another_table_gets_a_hyperbola_of_its_own_that_never_cuts_a_ramp() -> N
         made = movement(OTHER, steps, 10, Way.HYPERBOLA, entries)
         assert made.train.steps == steps
         assert made.clocks >= movement(OTHER, steps, 10, Way.EXACT, entries).clocks
+
+
+TABLES = st.builds(
+    lambda differences, spare, interval: Differences(sum(differences) + spare, bytes(differences), interval),
+    st.lists(st.integers(0, 255), min_size=1, max_size=12), st.integers(1, 4000), st.sampled_from([1, 7, 300, 2580]),
+)  # fmt: skip
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    TABLES, st.lists(st.integers(1, 1200), min_size=1, max_size=4), st.sampled_from(Way), st.integers(4, 12), st.data()
+)
+def test_whatever_the_table_a_movement_has_exactly_its_pulses(
+    table: Differences, lengths: list[int], way: Way, offset: int, data: st.DataObject
+) -> None:
+    for steps in lengths:
+        made = movement(table, steps, offset, way, data.draw(st.integers(0, len(table.differences))))
+        assert made.train.steps == steps
+        assert not made.loads or made.loads[-1].clock <= made.clocks

@@ -132,6 +132,16 @@ def test_a_braked_movement_keeps_its_past_and_ends_at_low_speed(
         made = shorter
 
 
+def test_movements_that_are_planned_apart_are_equal() -> None:
+    one = ramped(PAPER, 3076, ALL_ENTRIES, 20_000, 10)
+    ramped.cache_clear()
+    other = ramped(PAPER, 3076, ALL_ENTRIES, 20_000, 10)
+    assert one.train.segments[0] is not other.train.segments[0]
+    assert one == other
+    assert hash(one.train) == hash(other.train)
+    assert one != ramped(PAPER, 3076, ALL_ENTRIES, 20_001, 10)
+
+
 def test_braking_runs_the_table_back_from_the_present_entry() -> None:
     made = ramped(PAPER, 3076, ALL_ENTRIES, 20_000, 10)
     shorter = braked(made, 100 * 2580, 645)

@@ -138,13 +138,11 @@ class _Builder:
         for line, units in {**{n: u for n, u in alone.items() if n not in on_lines}, **lines}.items():
             found = self.models[units[0]]
             if isinstance(found, Part):
-                if len(units) > 1:
-                    raise self.problem(f"lines.{line}.units", f"{units[0]} has the line to its host for itself")
-                continue
+                continue  # an adapter
             described = self.description.lines.get(line)
             if described is not None and described.host is not None:
-                for unit in units:  # the wire of party select is high until the adapter pulls it low
-                    named[unit] = ({"PARTY": HIGH} if "PARTY" in found.straps else {}) | named[unit]
+                for each_unit in units:  # the wire of party select is high until the adapter pulls it low
+                    named[each_unit] = ({"PARTY": HIGH} if "PARTY" in found.straps else {}) | named[each_unit]
             # the links of a daisy chain are lines of one unit each
             shared = [[unit] for unit in units] if described is not None and described.kind else [units]
             try:
@@ -177,6 +175,8 @@ class _Builder:
             for unit in entry.units:
                 self.need_unit(f"lines.{line}.units", unit)
                 part = PARTS.get(described.units[unit].model)
+                if part is not None and part.adapter and len(entry.units) > 1:
+                    raise self.problem(f"lines.{line}.units", f"{unit} has the line to its host for itself")
                 if part is not None and not part.adapter:
                     raise self.problem(f"lines.{line}.units", f"{unit} has no serial port: remove it")
                 if unit in seen:
@@ -268,13 +268,12 @@ class _Builder:
                 if entry.axis not in axes:
                     raise self.problem(f"motors.{name}.axis", str(catalogue.unknown("axis", entry.axis, axes)))
             mine = {
-                switch: place
-                for switch, place in described.switches.items()
-                if place.axis is not None and (place.axis == name or on_axis.get((place.axis, "")) == name)
+                switch: where
+                for switch, where in described.switches.items()
+                if where.axis is not None and name in (where.axis, on_axis.get((where.axis, "")))
             }
             shaft = described.units[entry.unit].shaft if entry.unit is not None else 0
-            for switch in mine:
-                self.contacts[switch] = len(self.parts)
+            self.contacts |= dict.fromkeys(mine, len(self.parts))
             if entry.unit is not None:
                 self.axes[len(self.parts)] = self.names.index(entry.unit)
             self.names.append(name)
@@ -375,8 +374,8 @@ class _Builder:
         for part, pins in enumerate(drives):
             for pin in pins:
                 self.parts[part].watch(pin)
-        for ends in reads:
-            for part, pin in ends:
+        for readers in reads:
+            for part, pin in readers:
                 found = self.parts[part]
                 if isinstance(found, Mechanics):
                     found.wired(pin)
@@ -458,7 +457,7 @@ class _Builder:
         programs = {name: self.assembled(name, unit, "program") for name, unit in units.items() if unit.program}
         for name, unit in units.items():
             if unit.eeprom or name in images:
-                image = images[name] if name in images else self.assembled(name, unit, "eeprom").image
+                image = images[name] if name in images else _whole(self.assembled(name, unit, "eeprom"))
                 try:
                     self.controller(name).restore(image)
                 except ImageError as error:
@@ -520,3 +519,9 @@ class _Builder:
     def need_unit(self, key: str, name: str) -> None:
         if name not in self.description.units:
             raise self.problem(key, str(catalogue.unknown("unit", name, tuple(self.description.units))))
+
+
+def _whole(assembly: Assembly[Any]) -> bytes:
+    """The image from the first address of the program memory on."""
+    language = assembly.language
+    return bytes([language.blank]) * (assembly.base - language.areas[0].start) + assembly.image

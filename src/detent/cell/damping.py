@@ -1,8 +1,8 @@
 """Phase reversal: the bang-bang damper of the GS-C200 datasheet ("Electronic damping", figures 22 and 23).
 
-It sits between the controller's step clock and the drive and passes the pulses on. The last pulse of a motion is known by MOV and
-RAMP, both low; `brake` later the motor is stepped back once, which slows the rotor that is swinging through, and `release`
-after the last pulse forward again, at the moment at which the rotor stands where it should.
+It sits between the controller's step clock and the drive and passes the pulses on. The last pulse of a motion is
+known by MOV and RAMP, both low; `brake` later the motor is stepped back once, which slows the rotor that is swinging
+through, and `release` after the last pulse forward again, at the moment at which the rotor stands where it should.
 """
 
 from collections.abc import Sequence
@@ -31,8 +31,8 @@ class PhaseReversal:
     pins: Sequence[Pin] = PINS
 
     def __init__(self, brake: Ns = 2 * MS, release: Ns = 3 * MS) -> None:
-        if not 0 < brake < release:
-            raise ValueError("the motor is released after it is braked: brake must be above 0 and below release")
+        if not 4 * PULSE <= brake <= release - 4 * PULSE:
+            raise ValueError("the motor is braked, and later released: brake is at least 8 us, release 8 us more")
         self.brake, self.release = brake, release
         self._inputs: dict[str, Level] = {pin.name: HIGH for pin in PINS if pin.kind is PinKind.INPUT}
         self._plan: list[tuple[Ns, str, Level]] = []  # what is still to be done, in order of time
@@ -66,8 +66,7 @@ class PhaseReversal:
         elif pin == "CLOCK":
             if self._plan and level == LOW:
                 self._finish(now)
-            if not self._plan:
-                self._driver.set("STEP", level, now)
+            self._driver.set("STEP", level, now)
         elif before and not self._moving:
             back, forth = 1 - self._inputs["DIR"], self._inputs["DIR"]
             self._plan = [
@@ -108,5 +107,3 @@ class PhaseReversal:
             self._driver.set(pin, level, now)
         self._plan = []
         self._driver.set("TURN", self._inputs["DIR"], now)
-
-

@@ -78,7 +78,7 @@ class Switch(_Table):
 
     drives: Names
     level: LevelField = HIGH  # when the cell starts; an axis decides for itself
-    axis: str | None = None  # the unit, or the motor, whose axis moves the contact
+    axis: str | None = None  # the unit (UNIT.AXIS where it has several), or the motor, whose axis moves the contact
     start: int | float | None = Field(None, validation_alias=AliasChoices("from"))  # steps; on a motor, its distance
     end: int | float | None = Field(None, validation_alias=AliasChoices("to"))
     at: int | None = None  # the same as from and to

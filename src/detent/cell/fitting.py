@@ -29,7 +29,9 @@ def motors_by_axis(description: Description) -> dict[tuple[str, str], str]:
     return found
 
 
-def mechanics(description: Description, name: str, switches: Mapping[str, Switch], shaft: int, record: bool) -> Mechanics:
+def mechanics(
+    description: Description, name: str, switches: Mapping[str, Switch], shaft: int, record: bool
+) -> Mechanics:
     """The mechanics of the motor `name`, with the switches that its rotor moves. Raises Problem."""
     entry = description.motors[name]
     try:
@@ -57,7 +59,7 @@ def _rig(entry: Motor) -> Rig:
     found = fitted(entry.motor).motor if entry.fitted else named(entry.motor)
     if entry.data:
         found = found.changed(**entry.data)
-    load = Load(**entry.load)
+    load = Load(**{str(name): value for name, value in entry.load.items()})  # type: ignore[arg-type]
     current = entry.current
     if isinstance(current, (int, float)):
         amps, currents = float(current), Currents()
@@ -85,5 +87,3 @@ def _contact(name: str, entry: Switch, motor: Motor) -> Contact:
             raise MotorError(f"switch {name} has no width: give from and to")
         ends = min(ends), max(ends)
     return Contact(name, *ends, entry.inside)
-
-

@@ -1,9 +1,10 @@
 """The mechanics of a cell: a motor with its drive and load on the pulses of a unit, and what its rotor moves.
 
-It follows the trains of a unit (or a wire with step pulses) and computes the rotor only as far as somebody must know: when
-a contact on its axis, a step detector or an encoder is wired, it looks ahead for the crossing and asks to be woken there;
-otherwise it costs nothing until it is asked where it is. What it computes depends on the pulses and on the current alone, not
-on when it was asked: a look ahead that proves wrong, because a motion changed its mind, is thrown away.
+It follows the trains of a unit (or a wire with step pulses) and computes the rotor only as far as somebody must know:
+when a contact on its axis, a step detector or an encoder is wired, it looks ahead for the crossing and asks to be
+woken there; otherwise it costs nothing until it is asked where it is. What it computes depends on the pulses and on
+the current alone, not on when it was asked: a look ahead that proves wrong, because a motion changed its mind, is
+thrown away.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from detent.cell.recording import Log
 from detent.controllers.device import Output
 from detent.motors import kernel
 from detent.motors.drive import FAST, SLOW
-from detent.motors.excitation import Changes, Sequencer
+from detent.motors.excitation import NOTHING, Changes, Sequencer, at_once
 from detent.motors.rotor import Floats, Rig, Rotor
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind
 from detent.ticks import MS, NEVER, US, Ns
@@ -134,7 +135,10 @@ class Course:
 
     def _run(self, changes: Changes, low: float, high: float, trace: "Log[Floats] | None") -> bool:
         if self.frozen:
-            self.rotor.n[kernel.NOW] = max(self.rotor.now, int(changes.times[0]))
+            begin = max(self.rotor.now, int(changes.times[0]))
+            if trace is not None:
+                trace.append(_row(self.rotor, begin))
+            self.rotor.n[kernel.NOW] = begin
             self.frozen = False
         self.anchor = int(changes.times[-1])
         return self._compute(changes, self.anchor, low, high, trace)
@@ -144,7 +148,7 @@ class Course:
         slice_ = SLICE // self.rotor.rig.substep * self.rotor.rig.substep  # its ends are ends of substeps
         while not self.frozen and self.rotor.now < until:
             boundary = self.anchor + ((self.rotor.now - self.anchor) // slice_ + 1) * slice_
-            if self._compute(_NOTHING, min(boundary, until), low, high, trace):
+            if self._compute(NOTHING, min(boundary, until), low, high, trace):
                 return True
             if self.rotor.now < boundary:
                 break  # what is left before `until` is less than a substep
@@ -187,7 +191,7 @@ class Mechanics:
         sequencer = Sequencer(rig.drive)
         rotor = Rotor(rig, sequencer, 0, SAMPLE)
         self._course = Course(rotor, sequencer)
-        self._first = self._row(rotor, 0)  # of the trace
+        self._first = _row(rotor, 0)  # of the trace
         self._ahead: Course | None = None  # as far as a look ahead has come without finding anything
         self._watched: set[str] = set()
         self._inputs: dict[str, Level] = {pin.name: HIGH for pin in PINS if pin.kind.reads}
@@ -221,12 +225,12 @@ class Mechanics:
         course.go(now)
         if not course.frozen and course.rotor.now < now:
             same = course.sequencer
-            course.rotor.run(_change(now, same.place, same.level, same.row, same.mode), now)
+            course.rotor.run(at_once(now, same.place, same.level, same.row, same.mode), now)
         return course.rotor
 
     def place(self, now: Ns) -> float:
         """Where the rotor is at `now`, in steps."""
-        return self.place_of(self.rotor_at(now).angle)
+        return float(self.place_of(self.rotor_at(now).angle))
 
     def command(self, now: Ns) -> float:
         """Where the pulses want it, in steps."""
@@ -240,13 +244,8 @@ class Mechanics:
         assert log is not None
         course = self._course.twin()
         course.go(now, trace=log)
-        rows = [self._first, *log, self._row(course.rotor, now)]
+        rows = [self._first, *log, _row(course.rotor, now)]
         return np.concatenate(rows)
-
-    def _row(self, rotor: Rotor, at: Ns) -> Floats:
-        s = rotor.s
-        phi = self.rig.drive.winding.angle(int(rotor.n[kernel.PLACE]))
-        return np.array([[at, s[kernel.X], s[kernel.W], s[kernel.IA], s[kernel.IB], phi]], np.float64)
 
     # -- the contract of a device ----------------------------------------------------------------------------
 
@@ -364,7 +363,7 @@ class Mechanics:
         if sequencer.mode != mode:
             self._go_before(now)
             sequencer.set_mode(mode)
-            self._course.change(_change(now, sequencer.place, sequencer.level, sequencer.row, mode), self.trace)
+            self._course.change(at_once(now, sequencer.place, sequencer.level, sequencer.row, mode), self.trace)
             self._plan(now)
 
     def _go_before(self, now: Ns) -> None:
@@ -485,8 +484,8 @@ def _crossing_time(rotor: Rotor, edge: float, up: bool) -> Ns:
     return rotor.now + ceil(last * 1e9)
 
 
-def _change(at: Ns, place: int, level: float, row: int, mode: int) -> Changes:
-    return Changes(np.array([at]), np.array([place]), np.array([level]), np.array([row]), np.array([mode]))
-
-
-_NOTHING = Changes(*(np.empty(0, kind) for kind in (np.int64, np.int64, np.float64, np.int64, np.int64)))
+def _row(rotor: Rotor, at: Ns) -> Floats:
+    """A row of the trace: the state as it is, said to be that of `at`."""
+    s = rotor.s
+    phi = rotor.rig.drive.winding.angle(int(rotor.n[kernel.PLACE]))
+    return np.array([[at, s[kernel.X], s[kernel.W], s[kernel.IA], s[kernel.IB], phi]], np.float64)

@@ -111,7 +111,9 @@ PARTS: dict[str, Part] = {
         damping.PINS,
         (
             Option("brake", "brake", parse_duration, "a duration", "2 ms", "from the last pulse to the step back"),
-            Option("release", "release", parse_duration, "a duration", "3 ms", "from the last pulse to the step forward"),
+            Option(
+                "release", "release", parse_duration, "a duration", "3 ms", "from the last pulse to the step forward"
+            ),
         ),
         damping.PhaseReversal,
     ),

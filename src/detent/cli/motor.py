@@ -61,8 +61,8 @@ def motor(
     fit
         Fit inductance and friction to the curve that the maker published, if there is one.
     move
-        Judge a move of so many steps, with --start, --slew and --ramp (constant acceleration, as the GS-C200's S, T, R).
-    start
+        Judge a move of so many steps, with --start, --slew and --ramp (constant acceleration, as the GS-C200's S, T,
+        R). start
         Start-stop speed, steps/s.
     slew
         Slew speed, steps/s.
@@ -158,7 +158,13 @@ def _list(json: bool) -> None:
     for motor in MOTORS.values():
         inertia = "-" if motor.inertia is None else f"{motor.inertia * 1e7:g}"
         values = (motor.current, motor.resistance, motor.inductance * 1e3, motor.holding_torque)
-        table.add_row(motor.name, motor.title.split(",")[0], *(f"{value:g}" for value in values), inertia, motor.source.split()[0].split("-")[0])
+        table.add_row(
+            motor.name,
+            motor.title.split(",")[0],
+            *(f"{value:g}" for value in values),
+            inertia,
+            motor.source.split()[0].split("-")[0],
+        )
     _print(table)
     print("\ndetent motor NAME  shows torque against speed;  detent motor NAME --move 1000 --slew 2000  judges a move.")
 
@@ -173,7 +179,12 @@ def _curve(rig: "Rig", facts: dict[str, Any], pull_in: bool, plot: Path | None, 
     per_step = rig.drive.winding.steps
     points = _useful(torque_curve(rig.motor, rig.drive, RATES))
     facts["curve"] = [
-        {"rate": point.rate * per_step, "full_steps_per_s": point.rate, "torque": point.torque, "load_angle": point.angle}
+        {
+            "rate": point.rate * per_step,
+            "full_steps_per_s": point.rate,
+            "torque": point.torque,
+            "load_angle": point.angle,
+        }
         for point in points
     ]
     measured = CURVES.get(rig.motor.name)
@@ -197,7 +208,9 @@ def _curve(rig: "Rig", facts: dict[str, Any], pull_in: bool, plot: Path | None, 
                       f"{point.torque * turns * 6.283185307:.1f}", f"{point.angle:.0f}\N{DEGREE SIGN}")  # fmt: skip
     _print(table)
     if pull_in:
-        print(f"\nStarts without a ramp into up to {facts['highest_start']:.0f} steps/s; the rule of thumb takes half of it.")
+        print(
+            f"\nStarts without a ramp into up to {facts['highest_start']:.0f} steps/s; the rule of thumb takes half of it."
+        )
         if facts["holes"]:
             bands = ", ".join(f"{low:.0f}-{high:.0f}" for low, high in facts["holes"])
             print(f"Resonance loses steps at {bands} steps/s: friction damps it, and so does a finer step.")
@@ -227,7 +240,9 @@ def _judge(
     if steps < 1:
         asked_wrongly(ValueError(f"--move {steps}: a move has at least one step"))
     if rig.motor.inertia == 1e-5:
-        asked_wrongly(ValueError(f"--inertia: the maker of {rig.motor.name} gives no rotor inertia: give rotor and load together"))
+        asked_wrongly(
+            ValueError(f"--inertia: the maker of {rig.motor.name} gives no rotor inertia: give rotor and load together")
+        )
     train = move(round(start), round(slew), ramp, steps).train
     duration = train.duration
     assert duration is not None
@@ -312,7 +327,9 @@ def _table(*columns: str) -> Any:
 
     table = Table(box=None, pad_edge=False, header_style="dim")
     for column in columns:
-        table.add_column(column, no_wrap=True, justify="left" if column in ("motor", "", "maker", "margin with") else "right")
+        table.add_column(
+            column, no_wrap=True, justify="left" if column in ("motor", "", "maker", "margin with") else "right"
+        )
     return table
 
 

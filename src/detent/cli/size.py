@@ -39,9 +39,9 @@ class Page(NamedTuple):
 
 
 def size(page: str | None = None, values: Sequence[str] = (), /, *, json: bool = False) -> None:
-    """Compute supplies and currents for a controller, with the warnings of its manual.
+    """Compute supplies and currents for a controller, as its manual does.
 
-    Without a page the pages are listed, without values what a page asks.
+    Its warnings are told, too. Without a page the pages are listed, without values what a page asks.
 
     Parameters
     ----------

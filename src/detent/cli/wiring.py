@@ -10,7 +10,9 @@ if TYPE_CHECKING:
 
 
 def wiring(readings: Sequence[str] = (), /, *, motor: str | None = None, json: bool = False) -> None:
-    """Find the windings of a motor from resistances between its leads, and list the orders to try.
+    """Find a motor's windings from the resistances between its leads.
+
+    The orders to try are listed, too.
 
     Measure every pair of leads with an ohmmeter and give the readings, like
 

@@ -135,6 +135,7 @@ class Task(Enum):
     POLL = "is it moving"
     SCAN = "is there an axis of this name"
     RESTART = "after ^P"
+    ABORT = "after ESC"
 
 
 class Waiting(Enum):
@@ -150,7 +151,7 @@ class Sin10(Adapter):
 
     Line of commands separated by ``;``, ended by CR or LF; each is answered with one line. `&` first: it restarts
     the axes in party line mode and answers their names. ``9W*`` and ``9Wn`` wait until all axes or one stand
-    still. ESC and ^C go through at once, and end everything.
+    still. ESC and ^C go through at once, and end everything; ESC is answered ``#``.
     """
 
     def __init__(
@@ -233,6 +234,9 @@ class Sin10(Adapter):
             self._up.discard()
             self._down.discard()
             self._down.send(bytes((value,)), now)
+            if value == ESC:
+                self._task = Task.ABORT
+                self._wait_for_echo(now)
         elif value in (CR, LF):
             if self._buffer and self._buffer[-1] != CR:
                 self._buffer.append(CR)
@@ -309,14 +313,14 @@ class Sin10(Adapter):
                 self._done(now)
             case Waiting.END:
                 self._reply.append(value)
-            case Waiting.NOTHING if self._task is Task.NONE:  # an answer to ESC
-                self._up.send(b"\r\n" if value == LF else bytes((value,)), now)
 
     def _no_echo(self, now: Ns) -> None:
-        """Patience is over: with an echo, or with the end of a line that was broken off; or ^P has been obeyed."""
+        """Patience is over: with an echo, or with the end of a broken line; or ^P or ESC has been obeyed."""
         if self._task is Task.RESTART:
             self._down.send(bytes((LF,)), now)
             self._scan(now)
+        elif self._task is Task.ABORT:
+            self._answer("#", now)
         elif self._waiting is Waiting.ECHO:
             self._silent = True
             self._to_send.clear()

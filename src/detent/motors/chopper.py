@@ -1,8 +1,8 @@
 """The switching chopper, microsecond by microsecond: for a look at currents and their ripple, not for moves.
 
 Fixed off-time: a phase gets the full supply until its current reaches what is wanted (not looked at during the blanking
-behind each switching-on), then the off-time passes: with the winding shorted (slow), against the supply (fast), or fast for the
-first part of it and slow for the rest (mixed). The rotor turns evenly at the speed of the pulses.
+behind each switching-on), then the off-time passes: with the winding shorted (slow), against the supply (fast), or
+fast for the first part of it and slow for the rest (mixed). The rotor turns evenly at the speed of the pulses.
 """
 
 from math import ceil, cos, exp, pi, sin
@@ -142,4 +142,5 @@ def inspect(
         rig.parameters, rig.table_a, rig.table_b, rate * drive.winding.steps, load_angle * pi / 180, settle, off, fast,
         round(blanking * 1e6), out,
     )  # fmt: skip
-    return Waveform(np.arange(rows) * MICROSECOND, *out.T, torque)
+    times = np.arange(rows, dtype=np.float64) * MICROSECOND
+    return Waveform(times, out[:, 0], out[:, 1], out[:, 2], out[:, 3], torque)

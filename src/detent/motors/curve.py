@@ -1,7 +1,7 @@
 """Torque against speed: what the motor gives at a speed held constant, whatever its rotor would do.
 
-The rotor is turned at the speed of the pulses and the currents settle; the mean torque over whole electrical cycles, at the
-load angle where it is greatest, is the pull-out torque. No resonance and no inertia come into it.
+The rotor is turned at the speed of the pulses and the currents settle; the mean torque over whole electrical cycles,
+at the load angle where it is greatest, is the pull-out torque. No resonance and no inertia come into it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -227,5 +227,3 @@ def pull_in_rate(motor: Motor, drive: Drive, load: Load = Load(), *, steps: int 
             break
         rate *= 2 ** (1 / 12)
     return Starts(tuple(rates), tuple(good))
-
-

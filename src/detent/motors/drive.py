@@ -1,8 +1,8 @@
 """The power stage: supply, phase current, how it is controlled, and how it is reduced when less will do.
 
 * ``fast``: a chopper whose current may fall against the full supply (ideal: no ripple);
-* ``slow``: a chopper that lets the current fall through the winding alone: it cannot follow a falling current, and damps;
-* ``auto``: slow below `decay_threshold`, fast above, slow at standstill (DCB-274, command b);
+* ``slow``: a chopper that lets the current fall through the winding alone: it cannot follow a falling current, and
+damps; * ``auto``: slow below `decay_threshold`, fast above, slow at standstill (DCB-274, command b);
 * ``voltage``: pulse width without current feedback (Norberg's boards): the duty gives `current` at standstill.
 """
 
@@ -52,7 +52,9 @@ class Drive(Shared):
             if not isfinite(factor) or not 0 <= factor <= 4:
                 raise MotorError(f"drive: the current factor {name} is {factor!r}: give 0 to 4")
         if self.drop >= self.supply:
-            raise MotorError(f"drive: a supply of {self.supply:g} V loses {self.drop:g} V in the switches: nothing is left")
+            raise MotorError(
+                f"drive: a supply of {self.supply:g} V loses {self.drop:g} V in the switches: nothing is left"
+            )
 
     @property
     def volts(self) -> float:
@@ -83,4 +85,6 @@ class Drive(Shared):
                 f"{self.current * self.volts / needed:.3g} A"
             )
         if self.current * max(self.currents[:3]) > 4 * motor.current:
-            raise MotorError(f"{self.current:g} A is more than four times the {motor.current:g} A of {motor.name}: check the units")
+            raise MotorError(
+                f"{self.current:g} A is more than four times the {motor.current:g} A of {motor.name}: check the units"
+            )

@@ -4,6 +4,7 @@ Pulses are times (ns) and directions. A `Sequencer` keeps what a drive remembers
 winding table, the rate it measures, the factor on the current. It makes the columns that `kernel.advance` takes.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,12 +28,17 @@ class Changes(NamedTuple):
     def __len__(self) -> int:
         return len(self.times)
 
+    def between(self, first: int, end: int) -> "Changes":
+        """Those from `first` to before `end`."""
+        return Changes(self.times[first:end], self.places[first:end], self.levels[first:end], self.rows[first:end],
+                       self.modes[first:end])  # fmt: skip
+
 
 class Sequencer:
     """The logic between pulses and power stage, for a drive that decides about its decay and its current by itself.
 
-    `level` may be set by whoever has a wire to the drive (MOV and RAMP). Feed pulses in order of time; what falls due by itself
-    behind the last of them (standstill, hold current) comes with the next pulses, or with `up_to`.
+    `level` may be set by whoever has a wire to the drive (MOV and RAMP). Feed pulses in order of time; what falls due
+    by itself behind the last of them (standstill, hold current) comes with the next pulses, or with `up_to`.
     """
 
     __slots__ = ("_base", "_held", "_slowed", "drive", "last", "level", "mode", "on", "place", "row", "stride")
@@ -52,7 +58,7 @@ class Sequencer:
         """The changes up to and including these pulses."""
         count = len(times)
         if not count:
-            return _changes([], [], [], [], [])
+            return NOTHING
         first = self.up_to(int(times[0]))
         places = self.place + self.stride * np.cumsum(np.broadcast_to(np.asarray(directions, np.int64), (count,)))
         levels = np.full(count, self._running())
@@ -83,13 +89,13 @@ class Sequencer:
                 self._held = True
                 self.level = self.drive.currents.rest if self.on else 0.0
             rows.append((at, self.place, self.level, self.row, self.mode))
-        return _changes(*zip(*rows, strict=True)) if rows else _changes([], [], [], [], [])
+        return _changes(*zip(*rows, strict=True)) if rows else NOTHING
 
     def set_level(self, level: float, at: Ns) -> Changes:
         """Somebody outside sets the factor on the current."""
         first = self.up_to(at)
         self.level = level
-        return joined(first, _changes([at], [self.place], [level], [self.row], [self.mode]))
+        return joined(first, at_once(at, self.place, level, self.row, self.mode))
 
     @property
     def slows_at(self) -> Ns:
@@ -120,13 +126,17 @@ class Sequencer:
         parts, begin = [], 0
         mine = (self.place, self.level, self.mode, self.last, self._held, self._slowed)
         for gap in gaps.tolist():
-            parts.append(Changes(*(column[begin : gap + 1] for column in change)))
-            self.place, self.level, self.mode = int(change.places[gap]), float(change.levels[gap]), int(change.modes[gap])
+            parts.append(change.between(begin, gap + 1))
+            self.place, self.level, self.mode = (
+                int(change.places[gap]),
+                float(change.levels[gap]),
+                int(change.modes[gap]),
+            )
             self.last = int(change.times[gap])
             self._held, self._slowed = not self.drive.currents.after, self.mode == self._base
             parts.append(self.up_to(int(change.times[gap + 1])))
             begin = gap + 1
-        parts.append(Changes(*(column[begin:] for column in change)))
+        parts.append(change.between(begin, len(change)))
         self.place, self.level, self.mode, self.last, self._held, self._slowed = mine
         return joined(*parts)
 
@@ -139,6 +149,16 @@ def joined(*parts: Changes) -> Changes:
     return Changes(*(np.concatenate(columns) for columns in zip(*some, strict=True))) if some else parts[0]
 
 
-def _changes(times, places, levels, rows, modes) -> Changes:  # type: ignore[no-untyped-def]
+def at_once(at: Ns, place: int, level: float, row: int, mode: int) -> Changes:
+    """One change."""
+    return _changes([at], [place], [level], [row], [mode])
+
+
+def _changes(
+    times: Sequence[int], places: Sequence[int], levels: Sequence[float], rows: Sequence[int], modes: Sequence[int]
+) -> Changes:
     return Changes(np.array(times, np.int64), np.array(places, np.int64), np.array(levels, np.float64),
                    np.array(rows, np.int64), np.array(modes, np.int64))  # fmt: skip
+
+
+NOTHING = _changes([], [], [], [], [])

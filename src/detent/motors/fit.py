@@ -1,7 +1,7 @@
 """A motor fitted to its published torque curve: a factor on the inductance, and viscous friction.
 
-They are correlations over the speeds that were measured, not physics: the factor stands for saturation, eddy currents and
-the losses of the drive. It is kept between 1 and 2.5, the friction at 0 or more.
+They are correlations over the speeds that were measured, not physics: the factor stands for saturation, eddy currents
+and the losses of the drive. It is kept between 1 and 2.5, the friction at 0 or more.
 """
 
 from collections.abc import Sequence

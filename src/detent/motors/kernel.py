@@ -1,7 +1,8 @@
 """The equations, stepped: one flat function in plain arithmetic.
 
-It runs as it stands (slowly), compiled by numba (`engine`), and as a thread of a GPU: it calls nothing but `floor`, and has
-its own sine, cosine and exponential, so that all of them give the same numbers, bit for bit where the hardware rounds alike.
+It runs as it stands (slowly), compiled by numba (`engine`), and as a thread of a GPU: it calls nothing but `floor`,
+and has its own sine, cosine and exponential, so that all of them give the same numbers, bit for bit where the
+hardware rounds alike.
 
 Phase frame; x = p theta is the electrical angle::
 
@@ -9,9 +10,10 @@ Phase frame; x = p theta is the electrical angle::
     J dw/dt = Kt (ib cos x - ia sin x) - Td sin 4x - B w - Tc sgn w - TL(t, theta)
 
 *Exponential midpoint*: over one substep the EMF is that of the predicted middle, the winding is solved exactly, and
-the rotor gets the torque of the mean current; Coulomb friction sticks exactly. Substeps are `h` long from the last change of
-excitation on, the one before the next change is what is left: no pulse falls into a substep, and where a substep ends depends
-on nothing but the changes. So a run may be cut anywhere, and goes on exactly as if it had not been.
+the rotor gets the torque of the mean current; Coulomb friction sticks exactly. Substeps are `h` long from the last
+change of excitation on, the one before the next change is what is left: no pulse falls into a substep, and where a
+substep ends depends on nothing but the changes. So a run may be cut anywhere, and goes on exactly as if it had not
+been.
 """
 
 from math import floor
@@ -40,14 +42,31 @@ FAR = 1 << 62
 
 
 def advance(  # type: ignore[no-untyped-def]
-    s, n, times, places, levels, rows, modes, until, table_a, table_b, par, by_time, by_position, low, high, trace, substep
+    s,
+    n,
+    times,
+    places,
+    levels,
+    rows,
+    modes,
+    until,
+    table_a,
+    table_b,
+    par,
+    by_time,
+    by_position,
+    low,
+    high,
+    trace,
+    substep,
 ):
     """Go on from the state (s, n): through the changes of excitation at `times` that are not after `until`.
 
     Change number k sets the place in the winding table, the factor on the current, the row of the table (its
-    stepping mode) and the decay. Behind them, whole substeps as far as they fit before `until`. Stops before a substep that reaches
-    the electrical angle `low` or `high` (CROSSED; the state is the one before it, the one behind it is in X_NEXT, W_NEXT,
-    ACC_NEXT, its length in STEP). BROKEN when the speed is no number any more. Angles in electrical radians, times in ns.
+    stepping mode) and the decay. Behind them, whole substeps as far as they fit before `until`. Stops before a
+    substep that reaches the electrical angle `low` or `high` (CROSSED; the state is the one before it, the one behind
+    it is in X_NEXT, W_NEXT, ACC_NEXT, its length in STEP). BROKEN when the speed is no number any more. Angles in
+    electrical radians, times in ns.
     """
     x = float(s[X])
     w = float(s[W])
@@ -196,7 +215,9 @@ def advance(  # type: ignore[no-untyped-def]
             torque = kt * (mean_b * cs - mean_a * sn)
             loaded = constant
             if many_times > 1:
-                place_in = min(max((t * 1e-9 + 0.5 * h - float(par[T_START])) / float(par[T_STEP]), 0.0), many_times - 1.0)
+                place_in = min(
+                    max((t * 1e-9 + 0.5 * h - float(par[T_START])) / float(par[T_STEP]), 0.0), many_times - 1.0
+                )
                 first = min(int(place_in), many_times - 2)
                 rest = place_in - first
                 loaded += float(by_time[first]) + rest * (float(by_time[first + 1]) - float(by_time[first]))

@@ -1,20 +1,41 @@
 """The same equations for many motors at once: one pulse train, many sets of parameters, `LANES` of them abreast.
 
-The inner loops run over lanes, without branches, so that a compiler makes vector instructions of them; the arithmetic is that of
-`kernel.advance`, operation by operation, and so are the results. The torque of the load is constant here.
+The inner loops run over lanes, without branches, so that a compiler makes vector instructions of them; the arithmetic
+is that of `kernel.advance`, operation by operation, and so are the results. The torque of the load is constant here.
 
-Imported only where numba is. One file, as numba looks for changes only in the file of the function that it keeps compiled.
+Imported only where numba is. One file, as numba looks for changes only in the file of the function that it keeps
+compiled.
 """
 
 import numpy as np
 from numba import njit, prange
 
 from detent.motors.kernel import (
-    ACC, AMPS, FAR, IA, IB, J, KT, L, OFFSET, PIO2_HIGH, PIO2_LOW, PITCH, R, TC, TD, TEETH, TL, TWO_OVER_PI, TWO_PI,
-    VOLTS, W, X,
+    ACC,
+    AMPS,
+    FAR,
+    GAIN,
+    IA,
+    IB,
+    KT,
+    OFFSET,
+    PIO2_HIGH,
+    PIO2_LOW,
+    PITCH,
+    TC,
+    TD,
+    TEETH,
+    TL,
+    TWO_OVER_PI,
+    TWO_PI,
+    VOLTS,
+    J,
+    L,
+    R,
+    W,
+    X,
 )  # fmt: skip
 from detent.motors.kernel import B as VISCOUS
-from detent.motors.kernel import GAIN
 
 LANES = 16
 WORST, WORST_PULSE, LOST_PULSE = 5, 6, 7  # rows of the state, behind X, W, IA, IB, ACC
@@ -22,11 +43,26 @@ ROWS = 8
 NEVER_LOST = 1e300
 
 
-
-
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")
 def advance_lanes(  # type: ignore[no-untyped-def]
-    state, par, lane, t, place, level, row, mode, pulses, times, places, levels, rows, modes, until, table_a, table_b, substep
+    state,
+    par,
+    lane,
+    t,
+    place,
+    level,
+    row,
+    mode,
+    pulses,
+    times,
+    places,
+    levels,
+    rows,
+    modes,
+    until,
+    table_a,
+    table_b,
+    substep,
 ):
     """Go on with the lanes from `lane` on, in `state` (rows by lanes), to `until`; see `kernel.advance`."""
     # one block of memory: so the compiler sees that no row overlaps another
@@ -202,9 +238,25 @@ def advance_lanes(  # type: ignore[no-untyped-def]
     return t
 
 
-@njit(parallel=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(parallel=True, cache=True, error_model="numpy")
 def advance_all(  # type: ignore[no-untyped-def]
-    state, par, now, place, level, row, mode, pulses, times, places, levels, rows, modes, until, table_a, table_b, substep
+    state,
+    par,
+    now,
+    place,
+    level,
+    row,
+    mode,
+    pulses,
+    times,
+    places,
+    levels,
+    rows,
+    modes,
+    until,
+    table_a,
+    table_b,
+    substep,
 ):
     """`advance_lanes` for every group of lanes in `state`. The time reached is that of each group."""
     groups = state.shape[1] // LANES

@@ -3,8 +3,8 @@
 Units are SI throughout: ohm, H, A, Nm, kg m2, s, rad. Makers' sheets say mH, mNm and g cm2; `named` turns them once.
 
 The current of a sheet is that of each phase with both phases on, and the holding torque is the one at that current;
-so the torque constant of a phase is Th / (sqrt(2) I). For a hybrid motor that is the same number as the maker's rule for the
-EMF, Th / (2 I) volts rms per rad/s (QSH4218 manual, section 5.4).
+so the torque constant of a phase is Th / (sqrt(2) I). For a hybrid motor that is the same number as the maker's rule
+for the EMF, Th / (2 I) volts rms per rad/s (QSH4218 manual, section 5.4).
 """
 
 from dataclasses import dataclass, field, replace
@@ -43,9 +43,9 @@ def need(owner: str, least: float, below: float = inf, /, *, open_: bool = False
 class Motor(Shared):
     """A two-phase hybrid or permanent-magnet step motor, one rotor and two windings.
 
-    `inductance_factor` and `viscous` are what a fit to a measured torque curve adds to the data sheet (`fit`): by default
-    the sheet is taken at its word. `viscous` is also where iron losses go: a magnetising resistance Rm is exactly
-    Kt**2 / Rm of it.
+    `inductance_factor` and `viscous` are what a fit to a measured torque curve adds to the data sheet (`fit`): by
+    default the sheet is taken at its word. `viscous` is also where iron losses go: a magnetising resistance Rm is
+    exactly Kt**2 / Rm of it.
     """
 
     name: str

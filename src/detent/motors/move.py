@@ -1,8 +1,8 @@
 """One move, judged: did the rotor follow every pulse?
 
-A rotor that falls more than a full electrical turn behind has lost four steps, even if it is caught again; one that rests
-a turn away from its command has, too. A load angle beyond 90 degrees alone is no loss: running motors stand up to 250 degrees
-behind their command (90 + atan(p w L / R), and their swing).
+A rotor that falls more than a full electrical turn behind has lost four steps, even if it is caught again; one that
+rests a turn away from its command has, too. A load angle beyond 90 degrees alone is no loss: running motors stand up
+to 250 degrees behind their command (90 + atan(p w L / R), and their swing).
 """
 
 from collections.abc import Iterator, Sequence
@@ -55,7 +55,9 @@ class Verdict(NamedTuple):
 
     def __str__(self) -> str:
         if not self.lost:
-            return f"no step lost; largest load angle {self.load_angle:.0f} of 360 degrees, after pulse {self.worst_pulse}"
+            return (
+                f"no step lost; largest load angle {self.load_angle:.0f} of 360 degrees, after pulse {self.worst_pulse}"
+            )
         where = f", first after pulse {self.lost_pulse}" if self.lost_pulse is not None else ""
         return f"{abs(self.steps_lost)} full steps lost{where}" if self.slip else f"lost and caught again{where}"
 
@@ -82,7 +84,7 @@ class Run:
 
     @property
     def times(self) -> Floats:
-        """s."""
+        """S."""
         return self.trace[:, kernel.T_COLUMN] * 1e-9
 
     @property
@@ -137,8 +139,8 @@ def simulate(
     for times, direction in chunks_of(parts):
         rotor.run(sequencer.pulses(times, direction), int(times[-1]), trace=trace)
     rotor.run(sequencer.up_to(ends + settle), ends + settle, trace=trace)
-    energies = Energies(*(float(rotor.s[k]) for k in (kernel.ELECTRIC, kernel.COPPER, kernel.MECHANIC)),
-                        _magnetic(rig, rotor) - magnetic)  # fmt: skip
+    electric, copper, mechanic = (float(rotor.s[k]) for k in (kernel.ELECTRIC, kernel.COPPER, kernel.MECHANIC))
+    energies = Energies(electric, copper, mechanic, _magnetic(rig, rotor) - magnetic)
     rows_done = trace[: int(rotor.n[kernel.TRACED])] if trace is not None else np.zeros((0, kernel.COLUMNS))
     return Run(rig, verdict(rotor), energies, count, ends, rows_done)
 
@@ -165,7 +167,11 @@ def parts_of(pulses: Pulses) -> Sequence[Part | Int64]:
     if isinstance(pulses, Train):
         return [Part(pulses)]
     if isinstance(pulses, np.ndarray):
-        if pulses.ndim != 1 or pulses.dtype.kind not in "iu" or (len(pulses) > 1 and bool((np.diff(pulses) <= 0).any())):
+        if (
+            pulses.ndim != 1
+            or pulses.dtype.kind not in "iu"
+            or (len(pulses) > 1 and bool((np.diff(pulses) <= 0).any()))
+        ):
             raise MotorError("pulse times are whole ns in one rising array")
         return [pulses.astype(np.int64, copy=False)]
     return pulses
@@ -209,5 +215,3 @@ def _magnetic(rig: Rig, rotor: Rotor) -> float:
     """Energy in the windings, J."""
     squares = float(rotor.s[kernel.IA]) ** 2 + float(rotor.s[kernel.IB]) ** 2
     return 0.5 * float(rig.parameters[kernel.L]) * squares
-
-

@@ -1,8 +1,8 @@
 """Named motors: makers' numbers, and where each row was read.
 
-Static data except where a fit is named. The two QSH4218 have published torque curves (`curves`), from which their factor on the
-inductance and their viscous friction come; for every other motor the sheet stands alone, and torque at speed is optimistic
-by 10 to 20 percent of the holding torque: fit your own curve (`fit.fit_from_curve`).
+Static data except where a fit is named. The two QSH4218 have published torque curves (`curves`), from which their
+factor on the inductance and their viscous friction come; for every other motor the sheet stands alone, and torque at
+speed is optimistic by 10 to 20 percent of the holding torque: fit your own curve (`fit.fit_from_curve`).
 """
 
 from difflib import get_close_matches

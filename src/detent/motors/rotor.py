@@ -126,7 +126,9 @@ class Rotor:
         """rad/s of the shaft."""
         return float(self.s[kernel.W])
 
-    def run(self, changes: Changes, until: Ns, low: float = -inf, high: float = inf, trace: Floats | None = None) -> int:
+    def run(
+        self, changes: Changes, until: Ns, low: float = -inf, high: float = inf, trace: Floats | None = None
+    ) -> int:
         """Go on through these changes to `until`; see `kernel.advance`. MotorError if the equations break."""
         rig = self.rig
         code: int = engine.advance()(

@@ -66,7 +66,9 @@ def judge(pulses: Pulses, rigs: Sequence[Rig], *, settle: Ns = SETTLE, begin: Ns
     substep = min(rig.substep for rig in rigs)
     parts = parts_of(pulses)
     count, ends = extent_of(parts, begin)
-    engine.check_size(substeps(ends + settle - begin, count, substep) * len(rigs), f"{len(rigs)} moves of {count} pulses")
+    engine.check_size(
+        substeps(ends + settle - begin, count, substep) * len(rigs), f"{len(rigs)} moves of {count} pulses"
+    )
     if not engine.fast():
         return [_alone(pulses, rig, substep, settle, begin) for rig in rigs]
     from detent.motors import lockstep

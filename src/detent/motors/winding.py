@@ -1,8 +1,8 @@
 """Winding tables: what the two phases get at each place of the sequence.
 
-A table covers one electrical cycle (four full steps). Its values are in units of the drive's phase current, so that both
-phases fully on are (1, 1) and a phase alone is (1, 0). `angle` is where the field points, in electrical radians: where the rotor
-of an ideal motor stands.
+A table covers one electrical cycle (four full steps). Its values are in units of the drive's phase current, so that
+both phases fully on are (1, 1) and a phase alone is (1, 0). `angle` is where the field points, in electrical radians:
+where the rotor of an ideal motor stands.
 """
 
 from collections.abc import Callable
@@ -41,8 +41,8 @@ class Winding(Shared):
         if steps % self.steps:
             raise MotorError(f"{self.name} has {self.steps} places a step: that does not divide {steps}")
         every = steps // self.steps
-        return Winding(self.name, steps, *(tuple(v for v in values for _ in range(every)) for values in (self.a, self.b)),
-                       self.offset)  # fmt: skip
+        a, b = (tuple(value for value in values for _ in range(every)) for values in (self.a, self.b))
+        return Winding(self.name, steps, a, b, self.offset)
 
 
 def _sampled(name: str, steps: int, offset: float, current: Callable[[int], float]) -> Winding:

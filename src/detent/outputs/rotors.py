@@ -39,4 +39,6 @@ def _trace(name: str, motor: Mechanics, now: Ns) -> RotorTrace:
     rows = rows[:: max(len(rows) // MOST_ROWS, 1)]
     places = np.array(motor.place_of(rows[:, kernel.X_COLUMN]))
     commands = np.array(motor.place_of(rows[:, kernel.PHI_COLUMN]))
-    return RotorTrace(name, rows[:, kernel.T_COLUMN], places, commands, rows[:, kernel.IA_COLUMN], rows[:, kernel.IB_COLUMN])
+    return RotorTrace(
+        name, rows[:, kernel.T_COLUMN], places, commands, rows[:, kernel.IA_COLUMN], rows[:, kernel.IB_COLUMN]
+    )

@@ -17,9 +17,8 @@ LIMIT = 1 << 62
 class Rows(Immutable):
     """The columns of a table with their running sums: read-only int64 arrays of one length, shared by parts.
 
-    Equal if their columns are.
     `counts` and `periods` are whole numbers of at least 1. ValueError for others, and for columns of different
-    lengths; OverflowError for a table of 2**62 ticks or more.
+    lengths; OverflowError for a table of 2**62 ticks or more. Rows are equal if their columns are.
     """
 
     __slots__ = ("counts", "periods", "pulses", "pulses_list", "ticks", "ticks_list")

@@ -178,10 +178,10 @@ def hyperbola(table: Differences) -> Hyperbola:
 def shortest(table: Differences, offset: int) -> int:
     """The least steps for which a member of the family beats constant low speed: below, the movement is very short."""
     members = family(table, len(table.differences))
-    steps = 1
-    while int(members.clocks(steps, offset).min()) >= steps * (table.first + 1):
-        steps += 1
-    return steps
+    for steps in range(1, LARGEST_N):
+        if int(members.clocks(steps, offset).min()) < steps * (table.first + 1):
+            return steps
+    return LARGEST_N
 
 
 def choose(table: Differences, steps: int, offset: int, way: Way, entries: int) -> Ramp:
@@ -197,11 +197,10 @@ def choose(table: Differences, steps: int, offset: int, way: Way, entries: int) 
     if way is Way.HYPERBOLA and entries == len(table.differences):
         if steps < shortest(table, offset):
             return Ramp(table.first, 0)
-        members = family(table, entries)
         first = hyperbola(table).first((steps - offset) // 2)
-        fits = members.clocks(steps, offset) < NEVER
-        # the very one, but for an offset so small that its table would end too late
-        return Ramp(first + int(fits[first - table.first :].argmax()), entries)
+        fits = np.flatnonzero(family(table, entries).clocks(steps, offset)[first - table.first :] < NEVER)
+        if len(fits):  # the very first, but for an offset so small that its table would end too late
+            return Ramp(first + int(fits[0]), entries)
     some = cuts(table, entries) if way is Way.FREE else family(table, entries)
     clocks = some.clocks(steps, offset)
     at = int(clocks.argmin())

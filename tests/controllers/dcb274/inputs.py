@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from hypothesis import strategies as st
+from tests.controllers.conformance import Candidate
 
 from detent.controllers.dcb274 import pins
 from detent.controllers.dcb274.commands import TABLE
@@ -10,13 +11,13 @@ from detent.controllers.dcb274.firmware import Dcb274
 from detent.lines.sin import Sin8, Sin10
 from detent.ticks import MS, US, Ns
 from detent.uart import Char
-from tests.controllers.conformance import Candidate
 
-NUMBERS = st.sampled_from([0, 0, 1, 2, 3, 5, 8, 10, 16, 20, 100, 128, 129, 160, 192, 200, 256, 1000, 1600, 2048, 8_388_607])
+USUAL = [0, 0, 1, 2, 3, 5, 8, 10, 16, 20, 100, 128, 129, 160, 192, 200, 256, 1000, 1600, 2048, 8_388_607]
+NUMBERS = st.sampled_from(USUAL)
 ARGUMENTS = st.lists(NUMBERS | st.integers(-300, 300) | st.integers(-20_000_000, 20_000_000), max_size=3)
 LETTERS = st.sampled_from([row.letter for row in TABLE])
-MOVING = st.sampled_from(["+100", "+7", "-30", "+0", "R 0", "R -50", "M 900", "M -3000", "M 0", "M 2000", "F 1000 0",
-                          "F 500 1", "@", "W", "W 3", "V 9000", "I 400", "K 1 2", "K 0 0", "D 3", "H 0", "O 5"])  # fmt: skip
+MOVING = st.sampled_from(["+100", "+7", "-30", "+0", "R 0", "R -50", "M 900", "M -3000", "M 0", "M 2000",
+                          "F 1000 0", "F 500 1", "@", "W", "W 3", "V 9000", "I 400", "K 1 2", "K 0 0", "D 3", "H 0", "O 5"])  # fmt: skip
 PROGRAMS = st.sampled_from([
     ["P 0", "+30", "W 0", "-20", "W 1", "Z", "G 0", "P"],
     ["P 128", "k 10 8", "k 20 16", "i 30 24", "P", "P 0", "O 0", "k 5 8", "+100", "W 0", "P", "G"],
@@ -87,7 +88,9 @@ CANDIDATES = (
     Candidate("dcb-274-e", lambda: Dcb274(encoder=True, p4_input=True), frames(False, (0, 1 * MS)), INPUTS, "RX"),
 )  # fmt: skip
 
-SIN_LINES = st.sampled_from([b"&\r", b"A+100;AZ\r", b"9WA;9W*;XZ\r", b"\x1b", b";;\r", b"A", b"A^   0\n", b"\n", b"#\n"])
+SIN_LINES = st.sampled_from(
+    [b"&\r", b"A+100;AZ\r", b"9WA;9W*;XZ\r", b"\x1b", b";;\r", b"A", b"A^   0\n", b"\n", b"#\n"]
+)
 _SIN = (SIN_LINES | st.binary(max_size=300)).map(lambda data: [(0, Char(value)) for value in data])
 SIN_CANDIDATES = tuple(
     Candidate(f"{name}, {port}", make, _SIN, ["SWITCH"], port)

@@ -1,4 +1,4 @@
-"""The manual's sample programs against an emulated board, with the outcome that their text describes (pages 48 to 55)."""
+"""The manual's sample programs against an emulated board, with the outcome of their text (pages 48 to 55)."""
 
 import sys
 from pathlib import Path
@@ -53,7 +53,7 @@ def test_gendemo_and_gendemoser_spin_both_motors_between_0_and_2000_in_every_mod
             if told.drive.sixteenths and (not modes or modes[-1] != told.drive.mode):
                 modes.append(told.drive.mode)
         assert modes == [0, 1, 2, 3], "each of the legal stepping modes in sequence"
-        assert 1000 == max(span_rate(one, axis))
+        assert max(span_rate(one, axis)) == 1000
     assert board.status(one.cell.now).state == "ready"
 
 
@@ -66,7 +66,7 @@ def span_rate(one, axis):
 def test_gendemoser_waits_for_the_end_of_every_move(samples):
     one = samples[3].VirtualStamp()
     samples[1].gendemoser(one)
-    sent = {at: text for at, text in one.sent}
+    sent = dict(one.sent)
     for axis in "XY":
         for begin, end, *_ in motions(one, axis):
             inside = [text for at, text in sent.items() if begin < at < end]

@@ -97,6 +97,10 @@ class SmcLanguage:
             raise StatementError(f"{found.letter} is not stored in a program; leave it out")
         return Statement(instruction, label, offset)
 
+    def origin(self, address: int) -> str:
+        """The line that says where the next instruction stands."""
+        return f"P {address}"
+
     def _origin(self, text: str) -> Statement[Instruction]:
         try:
             values = commands.parse(text).values

@@ -47,7 +47,7 @@ _COMMON: tuple[Pin, ...] = (
     Pin("VM", None, PinKind.SUPPLY, "motor supply, 4.5 to 34 V"),
     Pin("GND", None, PinKind.SUPPLY, "ground"),
     *(
-        Pin(winding(axis, name), None, PinKind.WINDING, f"{axis} motor, {_MOTOR_HELP[name]}: 1 while it gets current", LOW)
+        Pin(winding(axis, name), None, PinKind.WINDING, f"{axis} motor, {_MOTOR_HELP[name]}: 1 with current", LOW)
         for axis in AXES
         for name in WINDINGS
     ),

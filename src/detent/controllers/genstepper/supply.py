@@ -88,17 +88,17 @@ def _warnings(question: Question, winding: float) -> Iterator[str]:
     most = WINDING_CURRENT * (2 if question.double_current else 1)
     per_connector = winding / (2 if question.double_current else 1)
     if winding > most:
-        yield f"{winding:.3g} A a winding is more than the {most:g} A of the board: product failure will result (page 7)"
+        yield f"{winding:.3g} A a winding, the board has {most:g} A: product failure will result (page 7)"
     if per_connector > FAN_CURRENTS[0]:
         yield "above 0.4 A a winding an external cooling fan must be used (page 10; pages 14 and 63 say above 0.6 A)"
     if question.voltage > FAN_VOLTAGE:
         yield "above 15 V of motor supply fan based cooling of the board is required (pages 14, 63)"
     low, high = SINGLE_VOLTS if question.supply == "SS" else MOTOR_VOLTS
     if not low <= question.voltage <= high:
-        remedy = (
-            "; use two supplies (DS or 5VO)" if question.supply == "SS" and question.voltage <= MOTOR_VOLTS[1] else ""
-        )
-        yield f"the motor supply with {question.supply} is {low:g} to {high:g} V (page 68), not {question.voltage:g} V{remedy}"
+        two = question.supply == "SS" and question.voltage <= MOTOR_VOLTS[1]
+        remedy = "; use two supplies (DS or 5VO)" if two else ""
+        limits = f"{question.supply} is {low:g} to {high:g} V (page 68)"
+        yield f"the motor supply with {limits}, not {question.voltage:g} V{remedy}"
     elif question.supply == "SS" and question.voltage < 7.5:
         yield "a single supply below 7.5 V leaves little for the 5 V regulator: pages 10 and 62 ask for 7.5 to 15 V"
     if question.supply == "SS" and question.logic_voltage is not None:
@@ -106,7 +106,7 @@ def _warnings(question: Question, winding: float) -> Iterator[str]:
     if question.supply == "DS":
         volts = question.logic_voltage
         if volts is None or not SINGLE_VOLTS[0] <= volts <= SINGLE_VOLTS[1]:
-            yield "DS needs 6.5 to 15 V at Vc, the lower the better: below, the board resets; above, the regulator fails (page 65)"
+            yield "DS needs 6.5 to 15 V at Vc, low rather than high: below the board resets, above it fails (page 65)"
     if question.supply == "5VO":
         volts = question.logic_voltage
         if volts is None or volts != 5.0:

@@ -76,8 +76,13 @@ def orders(found: Found) -> tuple[Order, ...]:
     else:
         a, b, c, d = found.ends
     return (
-        Order(a, b, c, d), Order(a, b, d, c), Order(a, d, b, c), Order(a, d, c, b), Order(a, c, d, b), Order(a, c, b, d),
-    )  # fmt: skip
+        Order(a, b, c, d),
+        Order(a, b, d, c),
+        Order(a, d, b, c),
+        Order(a, d, c, b),
+        Order(a, c, d, b),
+        Order(a, c, b, d),
+    )
 
 
 def sensible(found: Found, order: Order) -> bool:

@@ -15,7 +15,7 @@ RAIL, FORCE, DIRECTION, STEP = "RAIL", "FORCE", "DIR", "OUT0"
 STEP_LOW_NS = 500  # counter 0 of the 8253 takes its output low for one clock a period
 
 PINS: tuple[Pin, ...] = (
-    Pin(BUS, None, PinKind.SERIAL, "MICROBUS, eight lines: every drive sees every byte of the CCU"),
+    Pin(BUS, None, PinKind.BUS, "MICROBUS, eight lines: every drive sees every byte of the CCU"),
     Pin(T0, 1, PinKind.INPUT, "/DATA READY: 0 while the CCU has a byte on the bus"),
     Pin(ANSWER, None, PinKind.OPEN_COLLECTOR, "/ANSWER READY: 0 while this drive has a byte on the bus"),
     Pin(MOVING, 24, PinKind.OUTPUT, "status line: 1 while the motor moves", LOW),

@@ -1,0 +1,103 @@
+"""The motor: simulated seconds a second, alone and abreast, against scipy's solve_ivp at equal accuracy."""
+
+import subprocess
+import sys
+from functools import partial
+from math import cos, sin
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from bench.rows import Row, measure
+from detent.motors import kernel
+from detent.motors.curve import torque_curve
+from detent.motors.drive import Drive
+from detent.motors.load import Load
+from detent.motors.move import simulate
+from detent.motors.named import motor
+from detent.motors.rotor import Rig
+from detent.motors.variants import changed, judge
+from detent.motors.winding import HALF
+from detent.ticks import SECOND
+
+PULSES, SETTLE_MS, VARIANTS = 1000, 29, 1024
+GAIN = 200.0  # V/A of the smooth chopper that a general integrator can take
+
+FIRST_CALL = """
+import sys, time
+import numba, numpy as np
+from detent.motors.drive import Drive
+from detent.motors.move import simulate
+from detent.motors.named import motor
+from detent.motors.rotor import Rig
+rig, times = Rig(motor("qsh4218-35-10-027"), Drive(24, 1.0)), np.arange(1, 11) * 1_000_000
+begin = time.perf_counter()
+simulate(times, rig)
+print(time.perf_counter() - begin)
+"""
+
+
+def rig() -> Rig:
+    """The small motor with its own inertia again as load, 24 V."""
+    found = motor("qsh4218-35-10-027")
+    return Rig(found, Drive(24, 1.0, HALF), Load(inertia=found.rotor, torque=0.03))
+
+
+def move() -> Any:
+    """1000 half steps in 0.36 s with ramps."""
+    half = PULSES // 2
+    n = np.arange(1, half + 1)
+    up = 2 * n / (700 + np.sqrt(700.0**2 + (4600.0**2 - 700.0**2) * n / half))
+    return np.round(np.concatenate((up, 2 * up[-1] - up[::-1][1:], [2 * up[-1]])) * SECOND).astype(np.int64)
+
+
+def by_scipy(one: Rig, times: Any) -> float:
+    """The end angle by LSODA: a proportional chopper with saturation, pulse by pulse."""
+    from scipy.integrate import solve_ivp
+
+    found, drive, load = one.motor, one.drive, one.load
+    kt, p, ohm, henry = found.torque_constant, found.teeth, found.resistance, found.inductance
+    inertia = found.rotor + load.inertia
+
+    def rates(_: float, y: Any, want_a: float, want_b: float) -> list[float]:
+        x, w, ia, ib = y
+        s, c = sin(x), cos(x)
+        va = min(max(GAIN * (want_a - ia) + ohm * want_a - kt * w * s, -drive.supply), drive.supply)
+        vb = min(max(GAIN * (want_b - ib) + ohm * want_b + kt * w * c, -drive.supply), drive.supply)
+        return [p * w, (kt * (ib * c - ia * s) - load.torque) / inertia, (va - ohm * ia + kt * w * s) / henry,
+                (vb - ohm * ib - kt * w * c) / henry]  # fmt: skip
+
+    state = one.at_rest(0, 1.0)[0]
+    y = np.array([state[kernel.X], 0.0, state[kernel.IA], state[kernel.IB]])
+    begin, place = 0.0, 0
+    for end in [*(times * 1e-9), times[-1] * 1e-9 + SETTLE_MS * 1e-3]:
+        want = HALF.a[place % 8], HALF.b[place % 8]
+        y = solve_ivp(rates, (begin, end), y, "LSODA", args=want, rtol=1e-5, atol=1e-7).y[:, -1]
+        begin, place = end, place + 1
+    return float(y[0])
+
+
+def rows() -> list[Row]:
+    """Simulated seconds a second, each against scipy in this run; the first call; a torque curve."""
+    one, times = rig(), move()
+    settle = SETTLE_MS * 1_000_000
+    seconds = int(times[-1]) * 1e-9 + SETTLE_MS * 1e-3
+    begin = perf_counter()
+    by_scipy(one, times)
+    baseline = seconds / (perf_counter() - begin)
+    single = seconds / measure(partial(simulate, times, one, settle=settle), 15)
+    random = np.random.default_rng(1)
+    rigs = [changed(one, inertia=random.uniform(0.8, 1.2), inductance=random.uniform(0.9, 1.1)) for _ in range(VARIANTS)]
+    lockstep = VARIANTS * seconds / measure(partial(judge, times, rigs, settle=settle))
+    command = [sys.executable, "-c", FIRST_CALL]
+    subprocess.run(command, check=True, capture_output=True)
+    first = float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    curve = measure(partial(torque_curve, one.motor, one.drive, [250 * k for k in range(1, 12)]))
+    scipy = "scipy LSODA rtol 1e-5, s/s"
+    return [
+        Row("one motor, simulated s", single, "s/s", scipy, baseline, 400 * baseline),
+        Row(f"{VARIANTS} motors abreast, simulated s", lockstep, "s/s", scipy, baseline, 5000 * baseline),
+        Row("first call, compiled code kept", first, "s", "allowed, s", 0.5, 0.5),
+        Row("torque curve of 11 points", curve * 1e3, "ms", "prototype, ms", 20.0, None),
+    ]
