@@ -131,7 +131,9 @@ class TestTime:
         assert made.recording is not None
         spans = made.recording.motion("axis", made.now)
         run = simulate([Part(span.train, span.direction, span.first, span.last) for span in spans], motor(made).rig)
-        assert motor(made).rotor_at(made.now).s[kernel.WORST] == pytest.approx(np.radians(run.verdict.load_angle), rel=1e-12)
+        assert motor(made).rotor_at(made.now).s[kernel.WORST] == pytest.approx(
+            np.radians(run.verdict.load_angle), rel=1e-12
+        )
 
     @pytest.mark.parametrize("slice_", [777, 50_000, 3 * MS + 1])
     def test_how_time_is_sliced_changes_nothing(self, slice_: Ns) -> None:
@@ -205,8 +207,8 @@ class TestDamping:
             assert motor(made, name).place(made.now) == pytest.approx(3, abs=0.02)
 
     def test_a_wrong_time_leaves_it_a_step_behind_or_swinging(self) -> None:
-        """"it could be that a system compensated in a no load condition will stop one step behind when fully loaded"."""
-        made = rest(example("damping", **{"release = \"2.0 ms\"": "release = \"3.5 ms\""}))
+        """ "it could be that a system compensated in a no load condition will stop one step behind when fully loaded"."""
+        made = rest(example("damping", **{'release = "2.0 ms"': 'release = "3.5 ms"'}))
         assert self.ring_down(made, "damped") > 20
 
 
@@ -297,5 +299,3 @@ def test_a_wrong_motor_is_told_with_key_and_remedy(old: str, new: str, said: str
     with pytest.raises(Problem) as caught:
         cell(AXIS.format(more="").replace(old, new))
     assert said in str(caught.value)
-
-

@@ -50,7 +50,7 @@ def pulses(cell: Cell, unit: str) -> list[Ns]:
 def test_no_example_is_without_a_test() -> None:
     tested = {
         "assembly", "closed-loop", "drilling", "genstepper", "homing",
-        "menu", "multipoint", "synchronised", "velocity",
+        "menu", "multipoint", "synchronised", "velocity", "xyz-party-line",
     }  # fmt: skip
     assert {path.parent.name for path in EXAMPLES.glob("*/cell.toml")} == tested
 
@@ -131,6 +131,13 @@ def test_the_belt_stops_one_ramp_behind_each_mark() -> None:
         assert stopped == belt.position(at + 200 * MS)
         assert stopped - belt.position(at) == 1 + 40  # the pulse that keeps its time, and R
     assert positions(cell) == {"belt": belt.position(cell.now)}
+
+
+def test_the_sin_10_moves_three_axes_by_one_line_and_reads_where_they_are() -> None:
+    cell = run(example("xyz-party-line"))
+    assert positions(cell) == {"x": 1000, "y": 1000, "z": 1000}
+    heard = bytes(h.char.value for h in cell.lines[0].take()).decode().split("\r\n")
+    assert heard == ["XYZ", "X+1000", "Y+1000", "Z+1000", "9W*", "XZ     1000", "YZ     1000", "ZZ     1000", ""]
 
 
 @pytest.fixture(scope="module")

@@ -59,7 +59,7 @@ def test_a_supply_below_the_windings_need_is_refused_with_what_it_could_drive() 
 
 
 def test_a_load_beyond_the_motor_is_refused_at_rest_and_lost_in_motion() -> None:
-    with pytest.raises(MotorError, match="more than the .* Nm that qsh4218-35-10-027 holds at rest"):
+    with pytest.raises(MotorError, match=r"more than the .* Nm that qsh4218-35-10-027 holds at rest"):
         simulate(even(100, 3), rig(torque=0.5))
     with pytest.raises(MotorError, match="inertia is -1"):
         Load(inertia=-1)

@@ -1,4 +1,4 @@
-"""The kernels: plain, compiled, abreast and as a thread of a GPU they give the same numbers; a run may be cut anywhere."""
+"""The kernels: plain, compiled, abreast, as a thread of a GPU they give the same numbers; a run may be cut anywhere."""
 
 import os
 import subprocess
@@ -61,9 +61,7 @@ def test_abreast_knows_the_other_drives(decay: str) -> None:
     base = Rig(SMALL, Drive(24, 1.0, HALF, decay), rig().load)  # type: ignore[arg-type]
     rigs = [changed(base, inertia=factor, resistance=2 - factor) for factor in (0.8, 1.0, 1.3)]
     times = even(400, 60)
-    alone = []
-    for one in rigs:
-        alone.append(simulate(times, one).verdict)
+    alone = [simulate(times, one).verdict for one in rigs]
     assert judge(times, rigs) == alone
 
 

@@ -1,9 +1,9 @@
 """The paper's result, as far as its data go: a 34-frame motor at 27 000 half steps a second without a loss.
 
 The paper names its motor (Rapid-Syn 34D-9209A) without resistance, inductance, torque or supply, and no curve to
-27 000. Assumed: a 34-frame motor of 5 Nm from a maker's sheet (Beckhoff AS1060), its inductance 1.8 times the sheet's as
-in the published curves, its windings in parallel, 160 V; no load but its own rotor; the paper's curve from 650, stretched to end at 27 000
-after the same 0.3 s.
+27 000. Assumed: a 34-frame motor of 5 Nm from a maker's sheet (Beckhoff AS1060), its inductance 1.8 times the sheet's
+as in the published curves, its windings in parallel, 160 V; no load but its own rotor; the paper's curve from 650,
+stretched to end at 27 000 after the same 0.3 s.
 """
 
 from dataclasses import replace
@@ -50,7 +50,7 @@ def test_27000_half_steps_a_second_are_reached_without_loss() -> None:
 
 
 def test_15000_the_required_speed_needs_half_the_voltage() -> None:
-    """"well above the 15 000 half steps per second which is the maximum required speed"."""
+    """ "well above the 15 000 half steps per second which is the maximum required speed"."""
     assert not simulate(supersigma(15_000, 20_000), rig(80, parallel=True)).verdict.lost
     assert simulate(supersigma(27_000, 20_000), rig(80, parallel=True)).verdict.lost
 

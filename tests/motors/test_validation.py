@@ -40,7 +40,7 @@ class TestV1SmallSwings:
 
     @pytest.mark.parametrize(("which", "hertz"), [(SMALL, 264.8), (LARGE, 242.7)])
     def test_a_full_step_swings_slower_by_the_law_of_the_pendulum(self, which: Motor, hertz: float) -> None:
-        """V1b: f0 pi / 2 K(sin 45 deg) = 0.847 f0; Jones, Stepping Motors, chapter 2: frequency falls with amplitude."""
+        """V1b: f0 pi / 2 K(sin 45 deg) = 0.847 f0; Jones, Stepping Motors, chapter 2."""
         run = simulate(np.array([MS]), Rig(which, Drive(24, which.current, FULL)), settle=60 * MS, sample=0)
         assert frequency(run, after_ms=2) == pytest.approx(hertz, rel=0.02)
 

@@ -104,7 +104,7 @@ class Switch(_Table):
 
 
 class Current(_Table):
-    """The phase current by the state of the axis, A: ramp, slew, rest (MOV, RAMP), or run and hold `after` the last step."""
+    """The phase current, A: ramp, slew, rest by MOV and RAMP, or run, and hold `after` the last step."""
 
     ramp: float = 0.0
     slew: float = 0.0

@@ -24,7 +24,9 @@ def motors_by_axis(description: Description) -> dict[tuple[str, str], str]:
             continue
         other = found.setdefault((entry.unit, entry.axis), name)
         if other != name:
-            what = f"{other} is on the axis of {entry.unit} already: a second motor needs a unit, or step pulses, of its own"
+            what = (
+                f"{other} is on the axis of {entry.unit} already: a second one needs a unit, or step pulses, of its own"
+            )
             raise Problem(description.file, f"motors.{name}.unit", what)
     return found
 

@@ -47,7 +47,7 @@ _QUADRATURE = ((LOW, LOW), (HIGH, LOW), (HIGH, HIGH), (LOW, HIGH))
 
 
 class Contact(NamedTuple):
-    """A switch on the axis: at `inside` while the rotor is between `low` and `high`, in steps; an infinite end is none."""
+    """A switch on the axis: at `inside` while the rotor is between `low` and `high`, in steps (or for ever)."""
 
     name: str
     low: float
@@ -79,6 +79,9 @@ class Detector(NamedTuple):
 
     def __deepcopy__(self, _: object) -> "Detector":
         return self
+
+
+DETECTOR = Detector()
 
 
 class Course:
@@ -180,7 +183,7 @@ class Mechanics:
         shaft: float = 0.0,
         reverse: bool = False,
         contacts: Sequence[Contact] = (),
-        detector: Detector = Detector(),
+        detector: Detector = DETECTOR,
         record: bool = False,
     ) -> None:
         self.rig, self.axis, self.detector = rig, axis, detector
@@ -454,7 +457,7 @@ class Mechanics:
         return int(course.train.time_of(self._checked + 1)) + self.detector.delay
 
     def _check(self, now: Ns) -> None:
-        """A pulse has been given: has the rotor made the step already?"""
+        """A pulse has been given: see whether the rotor has made the step already."""
         self._go_before(now)
         course = self._course
         self._checked += 1

@@ -136,7 +136,8 @@ def _settings(rig: "Rig") -> dict[str, Any]:
     drive, load = rig.drive, rig.load
     return {
         "supply": drive.supply, "current": drive.current, "step": drive.winding.name, "decay": drive.decay,
-        "inertia": rig.motor.rotor + load.inertia, "friction": load.friction, "viscous": load.viscous, "torque": load.torque,
+        "inertia": rig.motor.rotor + load.inertia, "friction": load.friction, "viscous": load.viscous,
+        "torque": load.torque,
     }  # fmt: skip
 
 

@@ -126,7 +126,7 @@ def inspect(
     off_time: float = 20e-6,
     blanking: float = 2e-6,
 ) -> Waveform:
-    """The currents of a switching chopper at `rate` full steps/s, `load_angle` (electrical degrees) behind the command."""
+    """The currents of a switching chopper at `rate` full steps/s, the rotor `load_angle` el. degrees behind."""
     need("chopper", 0, 1e6, open_=True, rate=rate)
     need("chopper", 1e-6, 1e-3, off_time=off_time, blanking=blanking)
     if decay not in ("slow", "mixed", "fast"):

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from detent.motors import engine, kernel
 from detent.motors.drive import Drive
-from detent.motors.load import Load
+from detent.motors.load import NO_LOAD, Load
 from detent.motors.motor import Motor, MotorError
 from detent.motors.move import simulate
 from detent.motors.rotor import SUBSTEP, Rig
@@ -37,7 +37,7 @@ class PullOut(NamedTuple):
 
 
 def mean_torque(rate, angle, par, table_a, table_b, mode, level, settle, cycles, per_place, flat):  # type: ignore[no-untyped-def]
-    """The mean torque (Nm, of the currents alone) of a rotor turned at `rate` electrical rad/s, `angle` rad behind the command.
+    """The mean torque (Nm, of the currents alone) of a rotor turned at `rate` el. rad/s, `angle` rad behind.
 
     `settle` places of the table pass first, then `cycles` turns of it are measured, `per_place` substeps to a place.
     `flat` is room for two floats.
@@ -116,15 +116,15 @@ def mean_torque(rate, angle, par, table_a, table_b, mode, level, settle, cycles,
     return flat[0]
 
 
-def pull_out(motor: Motor, drive: Drive, rate: float, *, level: float = 1.0, load: Load = Load()) -> PullOut:
+def pull_out(motor: Motor, drive: Drive, rate: float, *, level: float = 1.0) -> PullOut:
     """The pull-out torque at `rate` full steps/s, `level` of the current flowing. MotorError for a rate that is none.
 
-    The load's friction is not subtracted: it is the torque that is there for it.
+    The motor's own friction is subtracted, a load's is not: this is the torque that is there for it.
     """
     if not 0 < rate <= MOST_RATE:
         raise MotorError(f"a speed is above 0 and at most {MOST_RATE:g} full steps/s, not {rate!r}")
     # an inertia is not needed here, and not every maker gives one
-    rig = Rig(motor if motor.inertia is not None else motor.changed(inertia=1e-5), drive, load)
+    rig = Rig(motor if motor.inertia is not None else motor.changed(inertia=1e-5), drive)
     turning = rate * pi / 2
     place_time = drive.winding.pitch / turning
     tau = motor.real_inductance / float(rig.parameters[kernel.R])
@@ -203,7 +203,7 @@ class Starts(NamedTuple):
 
 
 def starts(rig: Rig, rates: Sequence[float], *, steps: int = 200) -> Starts:
-    """Try to start into each rate for `steps` full steps. What happens at the end, without a ramp down, does not count."""
+    """Try to start into each rate for `steps` full steps. The end, without a ramp down, does not count."""
     started = []
     for rate in rates:
         per_pulse = SECOND / (rate * rig.drive.winding.steps)
@@ -212,7 +212,7 @@ def starts(rig: Rig, rates: Sequence[float], *, steps: int = 200) -> Starts:
     return Starts(tuple(rates), tuple(started))
 
 
-def pull_in_rate(motor: Motor, drive: Drive, load: Load = Load(), *, steps: int = 200) -> Starts:
+def pull_in_rate(motor: Motor, drive: Drive, load: Load = NO_LOAD, *, steps: int = 200) -> Starts:
     """The start-stop rates in octaves of a twelfth, from 20 full steps/s to where nothing starts any more."""
     rig = Rig(motor, replace(drive), load)
     rates: list[float] = []

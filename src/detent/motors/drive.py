@@ -29,6 +29,9 @@ class Currents(NamedTuple):
     after: Ns = 0  # from the last pulse to `rest`, where the drive itself decides
 
 
+STEADY = Currents()
+
+
 @dataclass(frozen=True, slots=True)
 class Drive(Shared):
     """A drive for two phases, bipolar."""
@@ -38,7 +41,7 @@ class Drive(Shared):
     winding: Winding = HALF
     decay: Decay = "fast"
     decay_threshold: float = 0.0  # full steps/s, for `auto`
-    currents: Currents = Currents()
+    currents: Currents = STEADY
     drop: float = 0.0  # V lost in the switches
     resistance: float = 0.0  # ohm of switches and wires
 
@@ -80,7 +83,8 @@ class Drive(Shared):
         needed = peak * (motor.resistance + self.resistance)
         if needed > self.volts:
             raise MotorError(
-                f"{self.volts:g} V cannot drive {peak:.3g} A through the {motor.resistance + self.resistance:.3g} ohm of {motor.name}: "
+                f"{self.volts:g} V cannot drive {peak:.3g} A through the {motor.resistance + self.resistance:.3g} ohm of "
+                f"{motor.name}: "
                 f"it needs {needed:.3g} V and several times that for speed; raise the supply, or lower the current to "
                 f"{self.current * self.volts / needed:.3g} A"
             )

@@ -57,3 +57,6 @@ class Load(Shared):
     def at_rest(self) -> float:
         """The torque at the start."""
         return self.torque + self.torque_by_time.at(0.0) + self.torque_by_position.at(0.0)
+
+
+NO_LOAD = Load()

@@ -1,4 +1,4 @@
-"""One move, judged: did the rotor follow every pulse?
+"""One move, judged by whether the rotor followed every pulse.
 
 A rotor that falls more than a full electrical turn behind has lost four steps, even if it is caught again; one that
 rests a turn away from its command has, too. A load angle beyond 90 degrees alone is no loss: running motors stand up

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from detent.motors import engine, kernel
 from detent.motors.drive import Drive
 from detent.motors.excitation import Changes, Sequencer
-from detent.motors.load import Load
+from detent.motors.load import NO_LOAD, Load
 from detent.motors.motor import Motor, MotorError, Shared
 from detent.ticks import US, Ns
 
@@ -26,7 +26,7 @@ class Rig(Shared):
 
     motor: Motor
     drive: Drive
-    load: Load = Load()
+    load: Load = NO_LOAD
     substep: Ns = SUBSTEP
     parameters: Floats = field(init=False)
     table_a: Floats = field(init=False)
@@ -46,8 +46,8 @@ class Rig(Shared):
         limit = min(0.5 * motor.real_inductance / resistance, 0.1 / fastest)
         if limit < 1e-7:
             raise MotorError(
-                f"motor {motor.name}: L / R of {motor.real_inductance / resistance:.2g} s, or the inertia of {inertia:.2g} kg m2, "
-                "is too small to be a motor's: check the units (H, kg m2)"
+                f"motor {motor.name}: L / R of {motor.real_inductance / resistance:.2g} s, or the inertia of "
+                f"{inertia:.2g} kg m2, is too small to be a motor's: check the units (H, kg m2)"
             )
         set_ = object.__setattr__
         set_(self, "substep", min(self.substep, floor(limit * 1e9)))

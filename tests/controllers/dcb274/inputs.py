@@ -16,8 +16,10 @@ USUAL = [0, 0, 1, 2, 3, 5, 8, 10, 16, 20, 100, 128, 129, 160, 192, 200, 256, 100
 NUMBERS = st.sampled_from(USUAL)
 ARGUMENTS = st.lists(NUMBERS | st.integers(-300, 300) | st.integers(-20_000_000, 20_000_000), max_size=3)
 LETTERS = st.sampled_from([row.letter for row in TABLE])
-MOVING = st.sampled_from(["+100", "+7", "-30", "+0", "R 0", "R -50", "M 900", "M -3000", "M 0", "M 2000",
-                          "F 1000 0", "F 500 1", "@", "W", "W 3", "V 9000", "I 400", "K 1 2", "K 0 0", "D 3", "H 0", "O 5"])  # fmt: skip
+MOVING = st.sampled_from([
+    "+100", "+7", "-30", "+0", "R 0", "R -50", "M 900", "M -3000", "M 0", "M 2000", "F 1000 0", "F 500 1", "@", "W",
+    "W 3", "V 9000", "I 400", "K 1 2", "K 0 0", "D 3", "H 0", "O 5",
+])  # fmt: skip
 PROGRAMS = st.sampled_from([
     ["P 0", "+30", "W 0", "-20", "W 1", "Z", "G 0", "P"],
     ["P 128", "k 10 8", "k 20 16", "i 30 24", "P", "P 0", "O 0", "k 5 8", "+100", "W 0", "P", "G"],

@@ -362,7 +362,7 @@ class Dcb274:
         elif desk.stage is Stage.NAMING:
             desk.name(value, now)
         elif desk.closed or self._running.active or self._motion.jogging:
-            if self.mode is Mode.WAITING:
+            if self.mode is Mode.WAITING and value != ord("@"):
                 self._sign_on(value, now)  # a program at 1600 does not keep anybody from signing on
                 return
             entered = self._entry.feed_closed(value)
