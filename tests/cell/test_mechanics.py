@@ -189,7 +189,7 @@ class TestClosedLoop:
 class TestDamping:
     @staticmethod
     def ring_down(made: Cell, name: str) -> float:
-        """ms from the first step to the last time the rotor is more than a twentieth of a step off, before the second."""
+        """ms from the first step to the last time the rotor is more than a twentieth of a step off, then."""
         rows = motor(made, name).traced(made.now)
         times, places = rows[:, 0] * 1e-6, np.array(motor(made, name).place_of(rows[:, 1]))
         first = float(times[np.argmax(places > 0.05)])
@@ -207,7 +207,7 @@ class TestDamping:
             assert motor(made, name).place(made.now) == pytest.approx(3, abs=0.02)
 
     def test_a_wrong_time_leaves_it_a_step_behind_or_swinging(self) -> None:
-        """ "it could be that a system compensated in a no load condition will stop one step behind when fully loaded"."""
+        """ "it could be that a system compensated in a no load condition will stop one step behind"."""
         made = rest(example("damping", **{'release = "2.0 ms"': 'release = "3.5 ms"'}))
         assert self.ring_down(made, "damped") > 20
 

@@ -65,7 +65,7 @@ def test_it_does_not_hang_on_one_number() -> None:
 
 
 def test_the_worst_moment_lies_where_the_ramp_turns_into_constant_speed() -> None:
-    """Figure 5, shaded: "this is a critical region where losses of synchronisation may occur"; more so with a corner."""
+    """Figure 5, shaded: "this is a critical region where losses of synchronisation may occur"."""
     loaded = replace(rig(160, parallel=True), load=Load(inertia=1e-3, viscous=5e-3))
     smooth = simulate(supersigma(15_000, 10_000), loaded).verdict
     steps = round((650 + 15_000) / 2 * RAMP)

@@ -210,7 +210,7 @@ def _curve(rig: "Rig", facts: dict[str, Any], pull_in: bool, plot: Path | None, 
     _print(table)
     if pull_in:
         print(
-            f"\nStarts without a ramp into up to {facts['highest_start']:.0f} steps/s; the rule of thumb takes half of it."
+            f"\nStarts without a ramp into up to {facts['highest_start']:.0f} steps/s; a common rule takes half of it."
         )
         if facts["holes"]:
             bands = ", ".join(f"{low:.0f}-{high:.0f}" for low, high in facts["holes"])
@@ -313,13 +313,13 @@ def _print_sensitivity(found: dict[str, list[dict[str, Any]]]) -> None:
 
 def _print_head(rig: "Rig", facts: dict[str, Any]) -> None:
     motor, drive = rig.motor, rig.drive
-    print(f"{motor.name} ({motor.title}): {motor.current:g} A, {motor.resistance:g} ohm, {motor.inductance * 1e3:g} mH, "
-          f"{motor.holding_torque:g} Nm")  # fmt: skip
+    print(f"{motor.name} ({motor.title}): {motor.current:g} A, {motor.resistance:g} ohm, {motor.inductance * 1e3:g} "
+          f"mH, {motor.holding_torque:g} Nm")  # fmt: skip
     print(f"{drive.supply:g} V, {drive.current:g} A, {drive.winding.name} step, {drive.decay} decay")
     if "fit" in facts:
         fit = facts["fit"]
-        print(f"fitted to the maker's curve: inductance x{fit['inductance_factor']:.2f}, {fit['viscous']:.2g} Nm s/rad of friction, "
-              f"{fit['rms']:.1%} of the holding torque off (rms)")  # fmt: skip
+        print(f"fitted to the maker's curve: inductance x{fit['inductance_factor']:.2f}, {fit['viscous']:.2g} Nm s/rad "
+              f"of friction, {fit['rms']:.1%} of the holding torque off (rms)")  # fmt: skip
     print()
 
 

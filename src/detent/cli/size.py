@@ -57,7 +57,7 @@ def size(page: str | None = None, values: Sequence[str] = (), /, *, json: bool =
 
     if page is None:
         for name, found in PAGES.items():
-            print(f"{name:8}  {found.title}")
+            print(f"{name:15}  {found.title}")
         print(f"\nWhat it asks: detent size {next(iter(PAGES))}")
         return
     if page not in PAGES:
@@ -171,6 +171,27 @@ def _genstepper(given: Mapping[str, Any]) -> Answer:
     return Answer(lines, facts, sheet.warnings)
 
 
+def _gsc200_current(given: Mapping[str, Any]) -> Answer:
+    from detent.controllers.gsc200.application import CONFLICT, resistors
+
+    found = resistors(given["rest"], given["slew"], given["ramp"], given["drive"])
+    meaning = {"r1": "to 5 V by Tr1, while ramping", "r2": "to ground by Tr2, at rest", "r3": "to ground, always"}
+    lines = [Line(f"{name.upper()} ({what})", f"{getattr(found, name):.0f} ohm") for name, what in meaning.items()]
+    return Answer(lines, {f"{name}_ohm": getattr(found, name) for name in meaning}, [CONFLICT])
+
+
+def _gsc200_slew(given: Mapping[str, Any]) -> Answer:
+    from detent.controllers.gsc200.application import SLEW_CONFLICT, slew_rate
+
+    turns = slew_rate(given["force"], given["length"], given["time"], given["torque"])
+    rate = turns / 60 * given["steps"]
+    lines = [Line("speed", f"{turns:.4g} turns/min"), Line("slew rate", f"{rate:.4g} steps/s: T{round(rate / 10)}")]
+    warnings = [SLEW_CONFLICT]
+    if rate > 10_000:
+        warnings.append("the module gives at most 10 000 steps/s")
+    return Answer(lines, {"turns_per_min": turns, "steps_per_s": rate}, warnings)
+
+
 def _maybe(read: Callable[[str], Any]) -> Callable[[str], Any]:
     return lambda text: read(text) if text else None
 
@@ -191,7 +212,27 @@ _BOARD = (
     Quantity("tap", number_with("A"), "A", "0", "from the board's 5 V, for a fan or other logic"),
 )
 
+_CURRENTS = (
+    Quantity("rest", number_with("A"), "A", "0.25", "phase current at rest"),
+    Quantity("slew", number_with("A"), "A", "0.5", "phase current at constant speed"),
+    Quantity("ramp", number_with("A"), "A", None, "phase current in the ramps"),
+    Quantity("drive", one_of(**{"GS-D200": "GS-D200", "GS-D200S": "GS-D200S"}), "GS-D200 or GS-D200S", "GS-D200", "drive"),
+)
+_SLEW = (
+    Quantity("force", number_with("lb"), "lb", None, "to be overcome"),
+    Quantity("length", number_with("in"), "inches", None, "to be moved"),
+    Quantity("time", number_with("s"), "s", None, "for it"),
+    Quantity("torque", number_with("ozin"), "oz in", None, "of the motor at that speed"),
+    Quantity("steps", int, "a whole number", "200", "steps in a turn"),
+)
+
 PAGES: dict[str, Page] = {
+    "gs-c200-current": Page(
+        "GS-C200 with a GS-D200: resistors for the phase currents by MOV and RAMP (datasheet, figure 11)",
+        _CURRENTS,
+        _gsc200_current,
+    ),
+    "gs-c200-slew": Page("GS-C200: slew speed of a load (datasheet, slew speed selection)", _SLEW, _gsc200_slew),
     "bs0610": Page("BS0610: power supply requirements (manual, pages 62 to 68)", _BOARD, _genstepper),
     "bs0710": Page("BS0710: power supply requirements (manual, pages 62 to 68)", _BOARD, _genstepper),
 }

@@ -75,8 +75,8 @@ def mean_torque(rate, angle, par, table_a, table_b, mode, level, settle, cycles,
             y2 = y * y
             sine = y - y * y2 * (1 / 6 - y2 * (1 / 120 - y2 * (1 / 5040 - y2 * (1 / 362880 - y2 * (
                 1 / 39916800 - y2 * (1 / 6227020800 - y2 * (1 / 1307674368000)))))))  # fmt: skip
-            cosine = 1.0 - y2 * (0.5 - y2 * (1 / 24 - y2 * (1 / 720 - y2 * (1 / 40320 - y2 * (
-                1 / 3628800 - y2 * (1 / 479001600 - y2 * (1 / 87178291200 - y2 * (1 / 20922789888000))))))))  # fmt: skip
+            cosine = 1.0 - y2 * (0.5 - y2 * (1 / 24 - y2 * (1 / 720 - y2 * (1 / 40320 - y2 * (1 / 3628800 - y2 * (
+                1 / 479001600 - y2 * (1 / 87178291200 - y2 * (1 / 20922789888000))))))))  # fmt: skip
             pairs = float(floor(turns * 0.5))
             odd = turns - 2.0 * pairs
             flip = 1.0 - 2.0 * (pairs - 2.0 * float(floor(pairs * 0.5)))

@@ -83,8 +83,8 @@ class Drive(Shared):
         needed = peak * (motor.resistance + self.resistance)
         if needed > self.volts:
             raise MotorError(
-                f"{self.volts:g} V cannot drive {peak:.3g} A through the {motor.resistance + self.resistance:.3g} ohm of "
-                f"{motor.name}: "
+                f"{self.volts:g} V cannot drive {peak:.3g} A through the {motor.resistance + self.resistance:.3g} "
+                f"ohm of {motor.name}: "
                 f"it needs {needed:.3g} V and several times that for speed; raise the supply, or lower the current to "
                 f"{self.current * self.volts / needed:.3g} A"
             )

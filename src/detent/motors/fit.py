@@ -42,8 +42,8 @@ def fit_from_curve(motor: Motor, drive: Drive, points: Sequence[Point], *, frict
     for rate, torque in points:
         if not (rate > 0 and 0 <= torque <= 2 * motor.holding_torque):
             raise MotorError(
-                f"the point {rate:g} steps/s, {torque:g} Nm does not belong to a motor of {motor.holding_torque:g} Nm: give "
-                "full steps/s and Nm"
+                f"the point {rate:g} steps/s, {torque:g} Nm does not belong to a motor of {motor.holding_torque:g} Nm: "
+                "give full steps/s and Nm"
             )
     rates = np.array([rate for rate, _ in points])
     torques = np.array([torque for _, torque in points])

@@ -185,8 +185,8 @@ def advance_lanes(  # type: ignore[no-untyped-def]
                 y2 = y * y
                 sine = y - y * y2 * (1 / 6 - y2 * (1 / 120 - y2 * (1 / 5040 - y2 * (1 / 362880 - y2 * (
                     1 / 39916800 - y2 * (1 / 6227020800 - y2 * (1 / 1307674368000)))))))  # fmt: skip
-                cosine = 1.0 - y2 * (0.5 - y2 * (1 / 24 - y2 * (1 / 720 - y2 * (1 / 40320 - y2 * (
-                    1 / 3628800 - y2 * (1 / 479001600 - y2 * (1 / 87178291200 - y2 * (1 / 20922789888000))))))))  # fmt: skip
+                cosine = 1.0 - y2 * (0.5 - y2 * (1 / 24 - y2 * (1 / 720 - y2 * (1 / 40320 - y2 * (1 / 3628800 - y2 * (
+                    1 / 479001600 - y2 * (1 / 87178291200 - y2 * (1 / 20922789888000))))))))  # fmt: skip
                 pairs = np.floor(turns * 0.5)
                 odd = turns - 2.0 * pairs
                 half = pairs - 2.0 * np.floor(pairs * 0.5)
@@ -262,6 +262,6 @@ def advance_all(  # type: ignore[no-untyped-def]
     groups = state.shape[1] // LANES
     ends = [0] * groups
     for group in prange(groups):
-        ends[group] = advance_lanes(state, par, group * LANES, now, place, level, row, mode, pulses, times, places, levels,
+        ends[group] = advance_lanes(state, par, group * LANES, now, place, level, row, mode, pulses, times, places,
                                rows, modes, until, table_a, table_b, substep)  # fmt: skip
     return ends[0]

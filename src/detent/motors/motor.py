@@ -79,8 +79,8 @@ class Motor(Shared):
             )
         if self.inductance * self.inductance_factor / self.resistance > 1:
             raise MotorError(
-                f"motor {self.name}: L / R is {self.inductance * self.inductance_factor / self.resistance:.3g} s, which no "
-                "step motor has: inductance is in H (a sheet's 2.8 mH is 0.0028)"
+                f"motor {self.name}: L / R is {self.inductance * self.inductance_factor / self.resistance:.3g} s, which "
+                "no step motor has: inductance is in H (a sheet's 2.8 mH is 0.0028)"
             )
 
     @property
@@ -103,7 +103,7 @@ class Motor(Shared):
         """The rotor's inertia. MotorError if the maker does not say."""
         if self.inertia is None:
             raise MotorError(
-                f"motor {self.name}: its maker gives no rotor inertia, so that its motion cannot be computed: give inertia"
+                f"motor {self.name}: its maker gives no rotor inertia, so that its motion cannot be computed: give it"
             )
         return self.inertia
 

@@ -86,7 +86,7 @@ def judge(pulses: Pulses, rigs: Sequence[Rig], *, settle: Ns = SETTLE, begin: Ns
 
     def go(changes: Changes, until: Ns) -> None:
         nonlocal place, level, mode, pulse, now
-        now = int(lockstep.advance_all(state, par, now, place, level, 0, mode, pulse, *changes, until, first.table_a, first.table_b,
+        now = int(lockstep.advance_all(state, par, now, place, level, 0, mode, pulse, *changes, until, first.table_a,
                          substep))  # fmt: skip
         if len(changes):
             pulse += int(np.count_nonzero(np.diff(changes.places, prepend=place)))
