@@ -61,7 +61,7 @@ def test_a_net_says_whether_it_changed(drives: list[tuple[int, int]]) -> None:
 
 
 def test_what_a_kind_of_pin_does_on_a_net() -> None:
-    assert [kind for kind in PinKind if kind.drives] == [PinKind.OUTPUT, PinKind.OPEN_COLLECTOR]
+    assert [kind for kind in PinKind if kind.drives] == [PinKind.OUTPUT, PinKind.OPEN_COLLECTOR, PinKind.WINDING]
     assert [kind for kind in PinKind if kind.reads] == [PinKind.INPUT, PinKind.STRAP]
 
 

@@ -49,7 +49,7 @@ def pulses(cell: Cell, unit: str) -> list[Ns]:
 
 def test_no_example_is_without_a_test() -> None:
     tested = {
-        "assembly", "closed-loop", "drilling", "genstepper", "homing",
+        "assembly", "closed-loop", "closed-loop-motor", "damping", "drilling", "genstepper", "homing",
         "menu", "multipoint", "synchronised", "velocity", "xyz-party-line",
     }  # fmt: skip
     assert {path.parent.name for path in EXAMPLES.glob("*/cell.toml")} == tested

@@ -131,16 +131,17 @@ step = cuda.jit(device=True)(kernel.advance)
 def motors(s, n, times, places, levels, rows, modes, until, a, b, par, by_time, by_position, trace, substep):
     k = cuda.grid(1)
     if k < s.shape[0]:
-        step(s[k], n[k], times, places, levels, rows, modes, until, a, b, par, by_time, by_position, -1e300, 1e300,
-        trace, substep)
+        step(s[k], n[k], times, places, levels, rows, modes, until, a, b, par, by_time, by_position,
+             -1e300, 1e300, trace, substep)
 
 one, times, until = rig(), even(700, 6), 12_000_000
 plain = Rotor(one, Sequencer(one.drive))
 s, n = np.array([plain.s] * 3), np.array([plain.n] * 3)
 changes = Sequencer(one.drive).pulses(times, 1)
-kernel_run = motors[1, 4]
-kernel_run(s, n, *changes, until, one.table_a, one.table_b, one.parameters, one.by_time, one.by_position, np.zeros((0,
-6)), one.substep) plain.run(changes, until)
+trace = np.zeros((0, 6))
+motors[1, 4](s, n, *changes, until, one.table_a, one.table_b, one.parameters, one.by_time, one.by_position,
+             trace, one.substep)
+plain.run(changes, until)
 assert (s == plain.s).all() and (n == plain.n).all(), (s - plain.s)
 print("same")
 """

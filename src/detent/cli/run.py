@@ -21,7 +21,7 @@ def run(
     target: str,
     *,
     program: Sequence[str] = (),
-    send: Sequence[str] = (),
+    send: Annotated[Sequence[str], Parameter(allow_leading_hyphen=True)] = (),
     for_: Annotated[str | None, Parameter(name="--for")] = None,
     plot: Path | None = None,
     vcd: Path | None = None,

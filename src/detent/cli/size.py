@@ -216,7 +216,9 @@ _CURRENTS = (
     Quantity("rest", number_with("A"), "A", "0.25", "phase current at rest"),
     Quantity("slew", number_with("A"), "A", "0.5", "phase current at constant speed"),
     Quantity("ramp", number_with("A"), "A", None, "phase current in the ramps"),
-    Quantity("drive", one_of(**{"GS-D200": "GS-D200", "GS-D200S": "GS-D200S"}), "GS-D200 or GS-D200S", "GS-D200", "drive"),
+    Quantity(
+        "drive", one_of(**{"GS-D200": "GS-D200", "GS-D200S": "GS-D200S"}), "GS-D200 or GS-D200S", "GS-D200", "drive"
+    ),
 )
 _SLEW = (
     Quantity("force", number_with("lb"), "lb", None, "to be overcome"),

@@ -335,8 +335,6 @@ MODELS: dict[str, Model] = {
         told_apart_by="number",
         answered=supersigma_link.answered,
     ),
-    "bs0610": _genstepper("bs0610", "RS-232"),
-    "bs0710": _genstepper("bs0710", "USB"),
     "dcb-274": Model(
         "dcb-274",
         "Advanced Micro Systems DCB-274 stepper motor driver/controller with SMC-27X2",
@@ -349,4 +347,6 @@ MODELS: dict[str, Model] = {
         dcb274_commands.reference,
         dcb274_pins.strap_line,
     ),
+    "bs0610": _genstepper("bs0610", "RS-232"),
+    "bs0710": _genstepper("bs0710", "USB"),
 }

@@ -263,5 +263,5 @@ def advance_all(  # type: ignore[no-untyped-def]
     ends = [0] * groups
     for group in prange(groups):
         ends[group] = advance_lanes(state, par, group * LANES, now, place, level, row, mode, pulses, times, places,
-                               rows, modes, until, table_a, table_b, substep)  # fmt: skip
+                                    levels, rows, modes, until, table_a, table_b, substep)  # fmt: skip
     return ends[0]

@@ -87,7 +87,7 @@ def judge(pulses: Pulses, rigs: Sequence[Rig], *, settle: Ns = SETTLE, begin: Ns
     def go(changes: Changes, until: Ns) -> None:
         nonlocal place, level, mode, pulse, now
         now = int(lockstep.advance_all(state, par, now, place, level, 0, mode, pulse, *changes, until, first.table_a,
-                         substep))  # fmt: skip
+                                       first.table_b, substep))  # fmt: skip
         if len(changes):
             pulse += int(np.count_nonzero(np.diff(changes.places, prepend=place)))
             place, level, mode = int(changes.places[-1]), float(changes.levels[-1]), int(changes.modes[-1])

@@ -38,13 +38,14 @@ def write_curve(path: Path, rig: Rig, points: Sequence[PullOut], measured: Measu
         axes.axhline(rig.motor.holding_torque, color=PALE, linestyle="--", linewidth=0.9)
         axes.set_ylim(bottom=0)
         axes.set_xlim(left=0)
-        _dress(axes, f"{rig.drive.winding.name} steps/s", "torque (Nm)")
+        dress(axes, f"{rig.drive.winding.name} steps/s", "torque (Nm)")
         axes.legend(frameon=False, loc="upper right")
         drive = rig.drive
         fit = f", inductance x{rig.motor.inductance_factor:.2f}" if rig.motor.inductance_factor != 1 else ""
         _head(figure, f"{rig.motor.name}: torque against speed",
-              f"{drive.supply:g} V  ·  {drive.current:g} A  ·  {drive.winding.name} step  ·  {drive.decay} decay{fit}")  # fmt: skip
-        _save(figure, path)
+              f"{drive.supply:g} V  ·  {drive.current:g} A  ·  {drive.winding.name} step  ·  {drive.decay} decay{fit}",
+              )  # fmt: skip
+        save(figure, path)
 
 
 def write_move(path: Path, run: Run, title: str) -> None:
@@ -57,7 +58,7 @@ def write_move(path: Path, run: Run, title: str) -> None:
         position.step(times, run.command, where="post", color=COMMAND, linewidth=0.9, label="command")
         position.plot(times, run.rotor, color=ROTOR, label="rotor")
         position.legend(frameon=False, loc="upper left")
-        _dress(position, "", "position (full steps)")
+        dress(position, "", "position (full steps)")
         angle.plot(times, run.load_angles, color=ROTOR, linewidth=0.9)
         for limit in (-360, 360):
             angle.axhline(limit, color=LOST, linewidth=0.8, linestyle="--")
@@ -65,15 +66,24 @@ def write_move(path: Path, run: Run, title: str) -> None:
         angle.plot(times[worst], run.load_angles[worst], "o", color=LOST, markersize=5)
         most = max(400.0, 1.1 * float(np.abs(run.load_angles).max()))
         angle.set_ylim(-min(most, 1500), min(most, 1500))
-        _dress(angle, "", "load angle (el. degrees)")
+        dress(angle, "", "load angle (el. degrees)")
         current.plot(times, run.trace[:, 3], color=PHASE_A, linewidth=0.8, label="phase A")
         current.plot(times, run.trace[:, 4], color=PHASE_B, linewidth=0.8, label="phase B")
         current.legend(frameon=False, loc="upper right")
-        _dress(current, "time (ms)", "current (A)")
+        dress(current, "time (ms)", "current (A)")
         for axes in (position, angle, current):
             axes.set_xlim(times[0], times[-1])
         _head(figure, f"{run.rig.motor.name}: {title}", str(run.verdict))
-        _save(figure, path)
+        save(figure, path)
+
+
+def blank(title: str, about: str, panels: int) -> "tuple[Figure, list[Axes]]":
+    """A figure with a heading and empty panels one above the other."""
+    figure = _figure(10.0, 1.6 + 2.8 * panels)
+    _head(figure, title, about)
+    room = (1 - 0.95 / figure.get_figheight()) / panels
+    boxes = [(0.09, room * (panels - 1 - k) + 0.14 / panels, 0.88, room - 0.2 / panels) for k in range(panels)]
+    return figure, [figure.add_axes(box) for box in boxes]
 
 
 def _figure(width: float, height: float) -> "Figure":
@@ -88,14 +98,16 @@ def _head(figure: "Figure", title: str, about: str) -> None:
     figure.text(0.03, 1 - 0.62 / height, about, fontsize=10, color=GREY)
 
 
-def _dress(axes: "Axes", x: str, y: str) -> None:
+def dress(axes: "Axes", x: str, y: str) -> None:
+    """Words at the axes, a grid, no frame."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
     axes.grid(True)
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _save(figure: "Figure", path: Path) -> None:
+def save(figure: "Figure", path: Path) -> None:
+    """Write the figure, whole or not at all. ValueError for another suffix, OSError."""
     check(path)
     data = BytesIO()
     kind = path.suffix.lower()[1:]

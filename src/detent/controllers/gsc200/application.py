@@ -13,9 +13,7 @@ PULL_UP = 10_000.0  # ohm, inside
 TO_GROUND = {"GS-D200": 1_200.0, "GS-D200S": 750.0}  # ohm, inside
 AMPS_PER_VOLT = 2.0
 
-CONFLICT = (
-    'the datasheet prints R1 = 4245 ohm "assuming the GS-D200S is used"; that is the value for the 1.2 kilo-ohm of the GS-D200'
-)
+CONFLICT = 'the datasheet prints R1 = 4245 ohm "assuming the GS-D200S is used"; that is the value for the 1.2 kilo-ohm of the GS-D200'
 SLEW_CONFLICT = (
     "the datasheet prints F L / (6000 t) = T N / 10, whose units do not agree; used here: F L / (6600 t) = 2 pi T N / 6 336 000 "
     "(1 hp = 33 000 ft lb/min)"
@@ -31,15 +29,18 @@ class Resistors(NamedTuple):
 
 
 def resistors(rest: float, slew: float, ramp: float, drive: str = "GS-D200") -> Resistors:
-    """R1 to R3 of figure 11 for these phase currents (A). ValueError for currents that no resistors give."""
-    ground = TO_GROUND[drive]
-    most = AMPS_PER_VOLT * SUPPLY * ground / (ground + PULL_UP)
+    """R1 to R3 of figure 11 for these phase currents (A). ValueError for currents that no resistors give.
+
+    R2 and R3 by the printed formulas, whichever the drive; R1 by what is inside the drive.
+    """
+    printed = TO_GROUND["GS-D200"]  # what the printed formula for R3 and R2 stands for
+    most = AMPS_PER_VOLT * SUPPLY * printed / (printed + PULL_UP)
     if not 0 < rest < slew < ramp:
         raise ValueError(f"currents rise from rest to slew to ramp: {rest:g}, {slew:g}, {ramp:g} A do not")
     if slew >= most:
         raise ValueError(f"{slew:g} A at slew is no less than the {most:.3g} A without any resistor: lower it")
-    at_rest, at_slew = (_beside(ground, _to_ground(amps)) for amps in (rest, slew))
-    parallel = _parallel(ground, at_slew)
+    at_rest, at_slew = (_beside(printed, _to_ground(amps)) for amps in (rest, slew))
+    parallel = _parallel(TO_GROUND[drive], at_slew)
     volts = ramp / AMPS_PER_VOLT
     if volts >= SUPPLY:
         raise ValueError(f"{ramp:g} A needs more than the {SUPPLY:g} V of the drive")
