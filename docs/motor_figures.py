@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/how-to/motors.md: python docs/motor_figures.py [FOLDER]. They are simulations, and repeat."""
+"""Draw the pictures of docs/how-to/motors.md: python docs/motor_figures.py [FOLDER]. Each run draws the same."""
 
 import sys
 from dataclasses import replace

@@ -52,6 +52,11 @@ def test_for_ends_a_move_that_has_no_end(capsys: pytest.CaptureFixture[str]) -> 
     assert found["units"] == {"gs-c200s": {"position": 1959, "pulses": 1959, "state": "running"}}
 
 
+def test_a_line_that_begins_with_a_minus_is_a_line(capsys: pytest.CaptureFixture[str]) -> None:
+    found = result(capsys, "gs-c200s", "--send", "-100")
+    assert found["units"] == {"gs-c200s": {"position": -100, "pulses": 100, "state": "ready"}}
+
+
 def test_a_program_is_loaded_and_executed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     program = tmp_path / "go.gsc"
     program.write_text("S10\nT100\nR50\nG500000 ; datasheet, example 1\n")

@@ -106,6 +106,7 @@ TABLES = {
     "Units": description.Unit,
     "Wires": description.Wire,
     "Switches": description.Switch,
+    "Motors": description.Motor,
     "Lines": description.Line,
     "Script": description.ScriptEntry,
 }

@@ -10,7 +10,7 @@ from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
 from detent.cell.cell import Cell, Store, Wiring, no_store
 from detent.cell.deeds import Action, Power, SetSwitch, Type
 from detent.cell.description import Description, Problem, ScriptEntry, Unit
-from detent.cell.fitting import check_names, mechanics, motors_by_axis
+from detent.cell.fitting import check_names, mechanics, motors_by_axis, split_axis
 from detent.cell.mechanics import Mechanics
 from detent.cell.parts import PARTS, Part
 from detent.cell.switches import AxisSwitch, Switch
@@ -270,7 +270,7 @@ class _Builder:
             mine = {
                 switch: where
                 for switch, where in described.switches.items()
-                if where.axis is not None and name in (where.axis, on_axis.get((where.axis, "")))
+                if where.axis is not None and name in (where.axis, on_axis.get(split_axis(where.axis)))
             }
             shaft = described.units[entry.unit].shaft if entry.unit is not None else 0
             self.contacts |= dict.fromkeys(mine, len(self.parts))

@@ -175,10 +175,17 @@ class Cell:
         """The host of a line sends `data`, now."""
         if self.journaling and not self._acting:
             self.journal.append(Action(self.now, Send(line, data)))
-        self.lines[line].send(data, self.now)
-        self._plan_lines()
-        if self._line_deadline <= self.now:
-            self._hear(self.now)
+        chars = self.lines[line].immediate(data)
+        if chars:  # nothing waits on such a line: what is sent is heard
+            for unit, port in self.wiring.lines[line]:
+                if self.recording is not None:
+                    self.recording.extend(unit, [Received(self.now, port, char, self.now) for char in chars])
+                self.parts[unit].receive(port, chars, self.now)
+                self._touched.add(unit)
+            self._settle()
+        else:
+            self.lines[line].send(data, self.now)
+            self._plan_lines()
         self._catch_up()
 
     def type(self, unit: str, text: str) -> None:
@@ -390,8 +397,9 @@ class Cell:
 
     def _catch_up(self) -> None:
         """What an action from outside makes due in this very instant happens in it."""
-        while self._next() <= self.now:
-            self._advance(self.now)
+        now = self.now
+        while self._next() <= now:
+            self._advance(now)
 
 
 _ALL = {EVERYBODY}

@@ -31,6 +31,12 @@ def motors_by_axis(description: Description) -> dict[tuple[str, str], str]:
     return found
 
 
+def split_axis(text: str) -> tuple[str, str]:
+    """Unit and axis of ``UNIT`` or ``UNIT.AXIS``."""
+    unit, _, axis = text.partition(".")
+    return unit, axis
+
+
 def mechanics(
     description: Description, name: str, switches: Mapping[str, Switch], shaft: int, record: bool
 ) -> Mechanics:
@@ -79,7 +85,7 @@ def _rig(entry: Motor) -> Rig:
 
 def _contact(name: str, entry: Switch, motor: Motor) -> Contact:
     low, high = entry.range
-    if entry.axis == motor.unit:
+    if entry.axis is not None and split_axis(entry.axis) == (motor.unit, motor.axis):
         # in whole steps, as without a motor: the rotor is at a step while it is nearer to it than to the next
         ends = (-inf if low is None else low - HALF_A_STEP, inf if high is None else high + HALF_A_STEP)
     else:

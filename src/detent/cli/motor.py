@@ -61,8 +61,8 @@ def motor(
     fit
         Fit inductance and friction to the curve that the maker published, if there is one.
     move
-        Judge a move of so many steps, with --start, --slew and --ramp (constant acceleration, as the GS-C200's S, T,
-        R). start
+        Judge a move of so many steps, with --start, --slew and --ramp (the GS-C200's S, T and R).
+    start
         Start-stop speed, steps/s.
     slew
         Slew speed, steps/s.

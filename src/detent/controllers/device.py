@@ -17,6 +17,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.pins import Level, Pin, PinSet, PulseOutput
+from detent.pulses.segment import Int64Array
 from detent.ticks import Ns
 from detent.uart import Char, Format, Sent, SerialPort
 
@@ -60,8 +61,15 @@ class Powered(NamedTuple):
 class Drive(Protocol):
     """How windings are driven, as a function of nothing but the position and the rate."""
 
+    @property
+    def ends(self) -> Sequence[str]:
+        """The winding ends, named as their pins less the name of the connector before them."""
+
     def duties(self, position: int, rate: int) -> Sequence[int]:
         """PWM counts of the winding ends, at a position in microsteps and a rate in microsteps/s."""
+
+    def duties_at(self, positions: Int64Array, rates: Int64Array) -> Int64Array:
+        """The same for many positions and rates: a row each."""
 
 
 class DriveSet(NamedTuple):

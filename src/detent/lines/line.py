@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 
 from detent.pins import Level
 from detent.ticks import NEVER, Ns
-from detent.uart import Char, Format, Sent, Transmitter
+from detent.uart import SOUND, Char, Format, Sent, Transmitter
 
 HOST_PORT = "HOST"
 EVERYBODY = -1
@@ -43,7 +43,18 @@ class Line:
     The units receive a character `early` ns before its end; with `start_bits`, `started` tells when one begins.
     """
 
-    __slots__ = ("_early", "_from_units", "_host", "_on_wire", "_start_bits", "_told", "deadline", "format", "heard")
+    __slots__ = (
+        "_early",
+        "_from_units",
+        "_host",
+        "_immediate",
+        "_on_wire",
+        "_start_bits",
+        "_told",
+        "deadline",
+        "format",
+        "heard",
+    )
 
     hosted: ClassVar[bool] = False  # whether its host is a unit of the cell
     strobe: ClassVar[str] = ""  # the input of every unit that the line drives, if it has such a wire
@@ -51,12 +62,20 @@ class Line:
     def __init__(self, form: Format, *, timed: bool = True, early: Ns = 0, start_bits: bool = False) -> None:
         self.format = form
         self._early, self._start_bits = (early, start_bits) if timed else (0, False)
+        self._immediate = not timed and type(self) is Line
         self._told = 0  # characters on the wire whose start bits were told
         self.deadline: Ns = NEVER
         self.heard: list[Heard] = []  # what reached the host and was not taken yet
         self._on_wire: list[Sent] = []  # from the host; also the transmitter's outbox
         self._host = Transmitter(HOST_PORT, form, self._on_wire, timed=timed)
         self._from_units: list[Talking] = []
+
+    def immediate(self, data: bytes) -> list[Char]:
+        """`data` as every unit hears it at once, on a plain line without timing; else nothing: `send` it."""
+        if not self._immediate:
+            return []
+        limit = 1 << self.format.data_bits
+        return [SOUND[value] if value < limit else Char(value % limit, parity_ok=False) for value in data]
 
     def send(self, data: bytes, now: Ns) -> None:
         """The host sends `data`, behind what it is still sending. A byte too wide for the line arrives damaged."""

@@ -77,9 +77,10 @@ class Motor(Shared):
                 f"motor {self.name}: its detent torque {self.detent_torque:g} Nm is not below its holding torque "
                 f"{self.holding_torque:g} Nm: it would not turn; check the units"
             )
-        if self.inductance * self.inductance_factor / self.resistance > 1:
+        constant = self.inductance * self.inductance_factor / self.resistance
+        if constant > 1:
             raise MotorError(
-                f"motor {self.name}: L / R is {self.inductance * self.inductance_factor / self.resistance:.3g} s, which "
+                f"motor {self.name}: L / R is {constant:.3g} s, which "
                 "no step motor has: inductance is in H (a sheet's 2.8 mH is 0.0028)"
             )
 

@@ -6,9 +6,11 @@
 | `UNIT/step_directions` | int8 | +1 or -1 |
 | `UNIT/positions` | int64 | the commanded position behind each pulse, in steps |
 | `UNIT/PIN/times`, `UNIT/PIN/levels` | int64, int8 | changes: from that time on the pin is 0, 1, or -1 (no supply) |
+| `UNIT/WINDING/times`, `UNIT/WINDING/counts` | int64, int16 | from that time on a winding end gets so many of 256 PWM counts |
 | `meta` | str | JSON: units, their pins and positions at 0, the end in ns, and what the caller adds |
 
-The first entry of a pin is its level before 0, at time -1. A step clock whose pulses no wire carries to another
+The first entry of a pin is its level before 0, at time -1. The second axis of a unit is a UNIT of its own, like
+`board.Y`; all pins, and all windings, are with the first. A step clock whose pulses no wire carries to another
 device has no entry of its own: `step_times` are its pulses, and `meta` tells their width and level. The same
 signals give the same bytes.
 """
@@ -26,6 +28,7 @@ from detent.cell.recording import Span
 from detent.outputs.files import open_whole
 from detent.outputs.signals import Signals, UnitSignals
 from detent.outputs.waves import UNKNOWN
+from detent.pulses.segment import Int64Array
 
 BLOCK = 1 << 18  # pulses made at a time
 
@@ -38,12 +41,14 @@ def write(path: Path, signals: Signals, meta: Mapping[str, Any] | None = None) -
         _put(archive, "meta", text.dtype, (), [text])
         for unit in signals.units:
             _put_unit(archive, unit)
+            _put_windings(archive, unit, signals)
 
 
 def _about(unit: UnitSignals) -> dict[str, Any]:
     output = unit.view.pulse_output
     return {
         "pins": list(unit.pins),
+        "windings": list(unit.windings),
         "position_at_0": unit.start,
         "pulse_output": None
         if output is None
@@ -63,13 +68,25 @@ def _put_unit(archive: ZipFile, unit: UnitSignals) -> None:
     places = (span.shaft + span.direction * np.arange(a, b + 1, dtype=np.int64) for span, a, b in _blocks(unit.spans))
     _put(archive, f"{name}/positions", int64, count, places)
     for pin in unit.pins:
-        if pin not in unit.unlogged:
+        if pin not in unit.unlogged and pin not in unit.windings:
             wave = unit.wave(pin)
             times = np.concatenate((np.array([-1], np.int64), wave.times))
             levels = np.concatenate(([unit.level_before(pin, 0)], wave.levels)).astype(np.int8)
             levels[levels == UNKNOWN] = -1
             _put(archive, f"{name}/{pin}/times", times.dtype, times.shape, [times])
             _put(archive, f"{name}/{pin}/levels", levels.dtype, levels.shape, [levels])
+
+
+def _put_windings(archive: ZipFile, unit: UnitSignals, signals: Signals) -> None:
+    found: dict[str, list[tuple[Int64Array, Int64Array]]] = {pin: [] for pin in unit.windings}
+    for begin, end in signals.windows() if found else ():
+        for pin, driven in unit.windings.items():
+            found[pin].append(driven.wave(pin, begin, end))
+    for pin, pieces in found.items():
+        times = np.concatenate([np.array([-1], np.int64), *(times for times, _ in pieces)])
+        counts = np.concatenate([np.zeros(1, np.int64), *(counts for _, counts in pieces)]).astype(np.int16)
+        _put(archive, f"{unit.name}/{pin}/times", times.dtype, times.shape, [times])
+        _put(archive, f"{unit.name}/{pin}/counts", counts.dtype, counts.shape, [counts])
 
 
 def _blocks(spans: Iterable[Span]) -> Iterator[tuple[Span, int, int]]:

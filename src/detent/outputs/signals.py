@@ -16,6 +16,7 @@ from detent.cell.cell import Cell
 from detent.cell.recording import Recording, Span
 from detent.outputs.units import UnitLog, UnitView, views
 from detent.outputs.waves import BEFORE_ALL, UNKNOWN, Wave, merge, serial_wave, wave
+from detent.outputs.windings import Driven, connectors
 from detent.pins import PulseOutput
 from detent.pulses.segment import Int64Array
 from detent.ticks import Ns
@@ -66,12 +67,15 @@ class Signals:
         for log in logs:
             first, *others = log.view.axes
             name = log.view.name
+            own = len(found)
             found.append(UnitSignals(log, _clipped(recording.motion(name, until, first), until), until))
             for axis in others:  # each further axis of a unit is one of its own, without the pins
                 alone = UnitLog(UnitView(f"{name}.{axis}", shaft=log.view.shaft))
                 found.append(
                     UnitSignals(alone, _clipped(recording.motion(name, until, axis), until), until, moves=True)
                 )
+            for connector in connectors(recording, name):
+                found[own].add_windings(Driven(recording, name, connector, found[own:]))
         self.units = tuple(found)
 
     def unit(self, name: str) -> "UnitSignals":
@@ -91,7 +95,10 @@ class Signals:
 
 
 class UnitSignals:
-    """The wires of one unit. `pins` are those that carry something to draw, in the order of the pin table."""
+    """The wires of one unit. `pins` are those that carry something to draw, in the order of the pin table.
+
+    `windings` are the winding ends that are driven, with what drives them, whether a wire leads from them or not.
+    """
 
     def __init__(self, log: UnitLog, spans: Sequence[Span], until: Ns, *, moves: bool = False) -> None:
         self.view, self.name = log.view, log.view.name
@@ -108,6 +115,11 @@ class UnitSignals:
         self._output = output  # of pulses that are no entries of their own
         self.unlogged = frozenset(output.pins.values()) if output is not None else frozenset()
         self._waves = {pin: self._logged(log, pin) for pin in self.pins}
+        self.windings: dict[str, Driven] = {}
+
+    def add_windings(self, driven: Driven) -> None:
+        """The windings at one of its connectors."""
+        self.windings |= dict.fromkeys(driven.pins, driven)
 
     @property
     def pulse_count(self) -> int:
@@ -136,6 +148,15 @@ class UnitSignals:
     def pulses(self, begin: Ns, end: Ns) -> Pulses:
         """The step pulses with begin <= time < end."""
         times, directions, positions = [], [], []
+        for span, first, last in self.runs(begin, end):
+            times.append(span.train.times(first, last))
+            directions.append(np.full(last - first + 1, span.direction, np.int64))
+            positions.append(span.shaft + span.direction * np.arange(first, last + 1, dtype=np.int64))
+        none = np.empty(0, np.int64)
+        return Pulses(*(np.concatenate(parts) if parts else none for parts in (times, directions, positions)))
+
+    def runs(self, begin: Ns, end: Ns) -> Iterator[tuple[Span, int, int]]:
+        """The motions that gave pulses with begin <= time < end, with the numbers of the first and the last of these."""
         for index in range(bisect_left(self._ends, begin), len(self.spans)):
             span = self.spans[index]
             if span.begins >= end:
@@ -143,11 +164,7 @@ class UnitSignals:
             first = max(span.first, span.train.steps_by(begin - 1) + 1)
             last = min(span.last, span.train.steps_by(end - 1))
             if first <= last:
-                times.append(span.train.times(first, last))
-                directions.append(np.full(last - first + 1, span.direction, np.int64))
-                positions.append(span.shaft + span.direction * np.arange(first, last + 1, dtype=np.int64))
-        none = np.empty(0, np.int64)
-        return Pulses(*(np.concatenate(parts) if parts else none for parts in (times, directions, positions)))
+                yield span, first, last
 
     def pulses_for(self, begin: Ns, end: Ns) -> Pulses:
         """The pulses that can change a pin in a window: also those whose end falls into it."""
@@ -156,9 +173,12 @@ class UnitSignals:
     def wave(self, pin: str, begin: Ns = 0, end: Ns | None = None, pulses: Pulses | None = None) -> Wave:
         """The changes of a pin with begin <= time < end (None: all). KeyError for a pin that is not drawn.
 
-        `pulses` are those of `pulses_for` in the same window, for a caller that has them already.
+        `pulses` are those of `pulses_for` in the same window, for a caller that has them already. A winding end
+        to which no wire leads is 1 with current, like one with a wire.
         """
         end = self._until + 1 if end is None else end
+        if pin not in self._waves and pin in self.windings:
+            return self.windings[pin].levels(pin, begin, end)
         changes = self._waves[pin].between(begin, end)
         output = self._output
         if output is not None and pin in self.unlogged:
@@ -169,6 +189,9 @@ class UnitSignals:
 
     def level_before(self, pin: str, t: Ns) -> int:
         """The level of a pin just before `t`."""
+        if pin not in self._waves and pin in self.windings:
+            driven = self.windings[pin]
+            return int(driven.counts(t - 1)[driven.pins.index(pin)] > 0)
         level = self._waves[pin].level_before(t, self._initial[pin])
         output = self._output
         if level == UNKNOWN or output is None or pin not in self.unlogged:

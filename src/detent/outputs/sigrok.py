@@ -38,8 +38,12 @@ class Channel(NamedTuple):
 
 
 def channels(signals: Signals, names: Sequence[str] | None = None) -> list[Channel]:
-    """The channels `names` (UNIT.PIN), in that order; None: every pin drawn. KeyError for a name that is none."""
-    every = {one.name: one for one in (Channel(unit, pin) for unit in signals.units for pin in unit.pins)}
+    """The channels `names` (UNIT.PIN), in that order; None: every pin drawn. KeyError for a name that is none.
+
+    The winding ends of a driver on the board are pins, too: 1 with current.
+    """
+    wires = ((unit, pin) for unit in signals.units for pin in dict.fromkeys((*unit.pins, *unit.windings)))
+    every = {one.name: one for one in (Channel(unit, pin) for unit, pin in wires)}
     if names is None:
         return list(every.values())
     for name in names:

@@ -1,7 +1,8 @@
 """Value change dumps (IEEE 1364): what GTKWave, Surfer and sigrok read.
 
 Timescale 1 ns, one scope a unit, wires named as its pins, and the commanded `position` as a signed integer.
-An output without supply is x. The same signals give the same bytes.
+An output without supply is x. A winding end of a driver on the board is a vector: the PWM counts it gets, which
+change at every step; 256 counts a period are always on. The same signals give the same bytes.
 """
 
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ Text = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
 
 _LEVELS = np.frombuffer(b"01x", np.uint8)
+_COUNT_BITS = 9  # of the PWM counts of a winding: 0 to 256
 _FIRST, _LAST = 33, 126  # identifiers are made of these printable characters
 _GROUPS = np.array([list(b"%04d" % n) for n in range(10_000)], np.uint8)  # four decimal digits at a time
 
@@ -60,7 +62,7 @@ class _Dump:
 
     def __init__(self, signals: Signals) -> None:
         self._signals = signals
-        count = sum(len(unit.pins) + 1 for unit in signals.units)
+        count = sum(len(_levels(unit)) + len(unit.windings) + 1 for unit in signals.units)
         self._identifiers = [_identifier(number) for number in range(count)]
         self._id_width = max((len(identifier) for identifier in self._identifiers), default=1)
         padded = b"".join(identifier.ljust(self._id_width, b"\0") for identifier in self._identifiers)
@@ -70,15 +72,22 @@ class _Dump:
 
     def header(self) -> bytes:
         """Everything up to the first change after 0, the levels before it included."""
-        lines = ["$comment Made by detent. position: the commanded one, in steps. $end", "$timescale 1 ns $end"]
+        about = "Made by detent. position: the commanded one, in steps."
+        if any(unit.windings for unit in self._signals.units):
+            about += " Winding ends: PWM counts, 256 counts a period."
+        lines = [f"$comment {about} $end", "$timescale 1 ns $end"]
         initial = ["#0", "$dumpvars"]
         identifiers = (identifier.decode() for identifier in self._identifiers)
         for unit in self._signals.units:
             lines.append(f"$scope module {_word(unit.name)} $end")
-            for pin in unit.pins:
+            for pin in _levels(unit):
                 identifier = next(identifiers)
                 lines.append(f"$var wire 1 {identifier} {_word(pin)} $end")
                 initial.append(f"{'01x'[unit.level_before(pin, 0)]}{identifier}")
+            for pin in unit.windings:
+                identifier = next(identifiers)
+                lines.append(f"$var wire {_COUNT_BITS} {identifier} {_word(pin)} $end")
+                initial.append(f"b0 {identifier}")
             identifier = next(identifiers)
             lines += [f"$var integer {self._bits} {identifier} position $end", "$upscope $end"]
             initial.append(f"b{unit.start % (1 << self._bits):b} {identifier}")
@@ -90,11 +99,17 @@ class _Dump:
         variable = 0
         for unit in self._signals.units:
             pulses = unit.pulses_for(begin, end)
-            for pin in unit.pins:
+            for pin in _levels(unit):
                 one = unit.wave(pin, begin, end, pulses)
                 if len(one.times):
                     same = np.full(len(one.times), variable, np.int64)
                     columns.append(_Rows(one.times, one.order, same, one.levels.astype(np.int64)))
+                variable += 1
+            for pin, driven in unit.windings.items():
+                times, counts = driven.wave(pin, begin, end)
+                if len(times):
+                    first, same = np.full((2, len(times)), [[BEFORE_ALL], [variable]], np.int64)
+                    columns.append(_Rows(times, first, same, counts))
                 variable += 1
             times = pulses.times
             inside = slice(int(np.searchsorted(times, begin)), None)
@@ -115,20 +130,27 @@ class _Dump:
         what a row does not need of them is then left out.
         """
         new = np.diff(rows.times, prepend=now) != 0
-        is_position = self._is_position()[rows.variables]
-        is_level = ~is_position
+        is_number = self._is_number()[rows.variables]
+        is_level = ~is_number
         parts: list[tuple[Text, Mask]] = [_decimal(rows.times, self._time_width, new)]
         parts.append((np.where(is_level, _LEVELS[np.where(is_level, rows.values, 0)], ord("b"))[:, None], _all(rows)))
-        if is_position.any():
-            parts.append(_binary(np.where(is_position, rows.values, 0), self._bits, is_position))
+        if is_number.any():
+            parts.append(_binary(np.where(is_number, rows.values, 0), self._bits, is_number))
         identifiers = self._id_text[rows.variables]
         parts += [(identifiers, identifiers != 0), (np.full((len(new), 1), 10, np.uint8), _all(rows))]
         text = np.concatenate([text for text, _ in parts], axis=1)
         wanted = np.concatenate([mask for _, mask in parts], axis=1)
         return bytes(text[wanted])
 
-    def _is_position(self) -> Mask:
-        return np.array([last for unit in self._signals.units for last in [*[False] * len(unit.pins), True]], np.bool_)
+    def _is_number(self) -> Mask:
+        units = self._signals.units
+        kinds = (kind for unit in units for kind in [*[False] * len(_levels(unit)), *[True] * len(unit.windings), True])
+        return np.array(list(kinds), np.bool_)
+
+
+def _levels(unit: UnitSignals) -> list[str]:
+    """The pins that are drawn as logic levels: a winding end has its counts instead."""
+    return [pin for pin in unit.pins if pin not in unit.windings]
 
 
 def _all(rows: _Rows) -> Mask:

@@ -169,6 +169,17 @@ class Ticked(Immutable):
         result: Int64Array = np.clip(i, self.first, last) - self.first
         return result
 
+    def rates_by(self, t: Int64Array, start: Fixed) -> Int64Array:
+        """The whole steps/s after the last tick that has its ns at or before each of `t` (any order)."""
+        k = arrays.ticks_by(t, self.tick.numerator, self.tick.denominator, start + self.anchor)
+        np.clip(k, 0, self.ticks, out=k)
+        scale = Fraction(SECOND, self.unit) / self.tick
+        speeds = self.speed + self.change * k
+        if self.unit * scale.numerator < 1 << 62:
+            rates: Int64Array = speeds * scale.numerator // scale.denominator
+            return rates
+        return np.array([speed * scale.numerator // scale.denominator for speed in speeds.tolist()], np.int64)
+
     def _fits(self) -> bool:
         """Whether `_excess` is exact: guesses are good to 2**-22 of the ticks, and differences stay small."""
         return self.unit * ((self.ticks >> 22) + 4) < 1 << 61

@@ -160,6 +160,7 @@ def test_external_steps_need_their_low_time_and_at_most_16000_a_second() -> None
         bench.pin("STEP", 0)
         bench.run_to(bench.now + low)
         bench.pin("STEP", 1)
+        bench.run_to(bench.now + 10 * US)
         moved = bench.position - before
         assert moved == (1 if low >= 7_000 else 0), (low, gap)
         bench.run_to(bench.now + SECOND)
@@ -170,7 +171,66 @@ def test_external_steps_need_their_low_time_and_at_most_16000_a_second() -> None
     bench.pin("STEP", 0)
     bench.run_to(bench.now + 50_000)
     bench.pin("STEP", 1)  # 50 us behind the last one: too fast
+    bench.run_to(bench.now + MS)
     assert bench.position == 2
+
+
+@pytest.mark.parametrize(("held", "moved"), [(0, 0), (9_999, 0), (10_000, 1), (11_000, 1)])
+def test_a_direction_that_is_not_held_10_us_behind_the_rising_edge_spoils_the_step(held: int, moved: int) -> None:
+    """Page 10: "Direction must be held for >10 microseconds after the rising step edge"."""
+    bench = Bench()
+    bench.run_to(MS)
+    bench.pin("STEP", 0)
+    bench.run_to(bench.now + 7 * US)
+    bench.pin("STEP", 1)
+    bench.run_to(bench.now + held)
+    bench.pin("DIR", 0)
+    bench.run_to(bench.now + MS)
+    assert bench.position == moved
+    bench.pin("STEP", 0)
+    bench.run_to(bench.now + MS)
+    bench.pin("STEP", 1)
+    bench.run_to(bench.now + MS)
+    assert bench.position == moved - 1
+
+
+def test_an_external_step_is_made_when_its_direction_has_been_held_and_dropped_by_a_limit_or_a_move() -> None:
+    for pin, at in (("", 0), ("LIMIT-A", 5 * US), ("JOG2", 5 * US)):
+        bench = Bench()
+        bench.run_to(MS)
+        bench.pin("STEP", 0)
+        bench.run_to(bench.now + 7 * US)
+        bench.pin("STEP", 1)
+        edge = bench.now
+        bench.run_to(edge + at)
+        if pin:
+            bench.pin(pin, 0)
+        bench.run_to(edge + 10 * US)
+        ended = [item.at for item in bench.of(MotionEnded)]
+        assert ended == ([] if pin else [edge + 10 * US]), pin
+
+
+def test_w_is_no_longer_while_steps_are_fast_since_page_51_has_only_a_bound_for_that() -> None:
+    """Page 51: "will increase the delay time by as much as 14 times"; the docs page has it among its limits."""
+    bench = Bench()
+    bench.do("M 36000", wait=5 * SECOND)
+    before = bench.now
+    bench.say("W 100\r")
+    bench.run_to(before + SECOND + 500 * US - 1)
+    assert not [o for o in bench.of(Sent) if o.at > before and o.char.value == 10]
+    bench.run_to(before + SECOND + 500 * US)
+    assert [o.at for o in bench.of(Sent) if o.at > before and o.char.value == 10] == [bench.now]
+
+
+def test_a_trip_position_slows_nothing_since_page_65_has_no_numbers() -> None:
+    """Page 65: "the top speed is reduced when trip points are introduced"; the docs page has it among its limits."""
+    trains = []
+    for trip in ("T 5000 100", "T 5000 0"):
+        bench = Bench()
+        bench.do("V 36000", trip, "+ 20000", wait=20 * SECOND)
+        (started,) = bench.of(MotionStarted)
+        trains.append(started.train)
+    assert trains[0] == trains[1]
 
 
 def test_an_encoder_gives_four_steps_a_slot_and_limits_hold() -> None:

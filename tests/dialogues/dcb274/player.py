@@ -16,16 +16,19 @@ stands before the first scene is the header of all. Characters take no time, com
     settle                       until nothing moves and no program runs
     pin GO = 0                   a level from outside; pin x.GO = 0 of several; power off; power on
     expect position 500          also state, pulses; an output: expect P4 = 0
+    expect percent 10            the set current, of 4 A; expect amperes 0.4: the peak of both windings, in microsteps
     changes P4 = 20              so often has the output changed since the scene began
 """
 
 from collections.abc import Iterator
+from math import hypot
 from pathlib import Path
 from typing import NamedTuple
 
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import parse
+from detent.controllers.dcb274.firmware import Dcb274
 from detent.pins import PinSet
 from detent.ticks import MS, SECOND, parse_duration
 
@@ -194,7 +197,14 @@ class Player:
             return
         name, value = rest.split()
         unit, what = self.place(name)
-        status = self.cell.controller(unit).status(self.cell.now)
+        controller = self.cell.controller(unit)
+        if what in ("percent", "amperes"):
+            assert isinstance(controller, Dcb274)
+            drive = controller.drive(self.cell.now)
+            found = str(drive.percent) if what == "percent" else str(round(hypot(*drive.amperes), 9))
+            self.check(found == value, f"it is {found}")
+            return
+        status = controller.status(self.cell.now)
         self.check(str(getattr(status, what)) == value, f"it is {status}")
 
     def do_changes(self, rest: str) -> None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from detent.axis import Axis
 from detent.controllers.dcb274 import settings
-from detent.controllers.dcb274.pins import LEAST_STEP_LOW, LEAST_STEP_PERIOD
+from detent.controllers.dcb274.pins import DIRECTION_HELD, LEAST_STEP_LOW, LEAST_STEP_PERIOD
 from detent.controllers.dcb274.ports import Ports
 from detent.controllers.dcb274.settings import Settings
 from detent.pins import HIGH, LOW, Level
@@ -75,7 +75,9 @@ class Motion:
         self._home_period = 0
         self._trip: int | None = None
         self._step_fell: Ns = -NEVER
-        self._stepped: Ns = -NEVER
+        self._stepped: Ns = -NEVER  # when the last external step was made
+        self._step_due: Ns = NEVER  # when an external step is made, if its direction is held until then
+        self._step_direction = 1
         self.step_period: Ns = NEVER  # between the last two external steps
 
     # -- looking -----------------------------------------------------------------------------------------
@@ -120,7 +122,7 @@ class Motion:
     @property
     def deadline(self) -> Ns:
         """When something happens by itself."""
-        return min(self._axis.deadline, self._ports.deadline)
+        return min(self._axis.deadline, self._ports.deadline, self._step_due)
 
     def next_change(self, now: Ns) -> Ns:
         """When the position changes next by itself."""
@@ -272,6 +274,8 @@ class Motion:
     def advance(self, at: Ns) -> News:
         """Deal with the deadline `at`; a step comes before whatever the outputs do."""
         if self._axis.deadline > at:
+            if self._step_due <= at:
+                return self._external_step(at)
             self._ports.advance(at)
             return NOTHING
         _, pulse = self._axis.advance(at)
@@ -363,12 +367,16 @@ class Motion:
         self._axis.remark(tuple(sorted({mark for mark in marks if mark > 0})), now)
 
     def _step_input(self, pin: str, level: Level, now: Ns) -> News:
-        """A step from outside: a rising edge, or with the encoder option an edge of A or B (page 10)."""
+        """A step from outside: a rising edge, or with the encoder option an edge of A or B (page 10).
+
+        A rising edge makes its step when its direction has been held for 10 us, and none when it has not.
+        """
         a, b = self._ports.levels["STEP"], self._ports.levels["DIR"]
         if self._encoder:
             # A leads B in plus direction: A equals B behind an edge of B, and differs behind one of A
-            direction = 1 if (a != b) is (pin == "STEP") else -1
+            direction, due = 1 if (a != b) is (pin == "STEP") else -1, now
         elif pin == "DIR":
+            self._step_due = NEVER
             return NOTHING
         elif level == LOW:
             self._step_fell = now
@@ -376,12 +384,23 @@ class Motion:
         elif now - self._step_fell < LEAST_STEP_LOW:
             return NOTHING
         else:
-            direction = 1 if b == HIGH else -1
-        if now - self._stepped < LEAST_STEP_PERIOD or not self.at_rest or self._ports.limit(direction):
+            direction, due = 1 if b == HIGH else -1, now + DIRECTION_HELD
+        if self._step_due < NEVER or due - self._stepped < LEAST_STEP_PERIOD or not self.at_rest:
+            return NOTHING
+        self._step_direction = direction
+        if due == now:
+            return self._external_step(now)
+        self._step_due = due
+        return NOTHING
+
+    def _external_step(self, now: Ns) -> News:
+        """Make the step that the inputs ask for, unless a motion of the axis's own or a limit is in its way."""
+        self._step_due = NEVER
+        if not self.at_rest or self._ports.limit(self._step_direction):
             return NOTHING
         self.step_period, self._stepped = now - self._stepped, now
         self._axis.every_pulse = False
-        self._axis.start(Train((Uniform(0, 1, 1, 1),), to_fixed(now - 1)), direction, (), now)
+        self._axis.start(Train((Uniform(0, 1, 1, 1),), to_fixed(now - 1)), self._step_direction, (), now)
         self._axis.advance(now)
         if self._ports.pulses_are_wired:
             self._ports.pulse(now)

@@ -13,7 +13,8 @@ from detent.uart import Format, SerialPort
 
 STEP_LOW: Ns = TICK  # of the step output, "short negative going pulses" (page 45), and of STEPS
 LEAST_STEP_LOW: Ns = 7 * US  # of the step input (page 10)
-DIRECTION_HOLD: Ns = 11 * US  # behind a rising step edge: more than the 10 us of page 10
+DIRECTION_HELD: Ns = 10 * US  # behind a rising edge of the step input, else the step is none (page 10)
+DIRECTION_HOLD: Ns = 11 * US  # of the direction output, behind a rising step edge: more than those 10 us
 LEAST_STEP_PERIOD: Ns = 62_500  # 16 000 steps a second (page 10)
 
 _IN, _STRAP, _OUT = PinKind.INPUT, PinKind.STRAP, PinKind.OPEN_COLLECTOR

@@ -5,8 +5,13 @@ WA1 at 0, WB1 a full step later, then WA2, WB2; between them, in microsteps, the
 ("near constant torque"). Duties count `FULL` for a winding that is always on.
 """
 
+from collections.abc import Sequence
 from math import cos, pi
 from typing import NamedTuple
+
+import numpy as np
+
+from detent.pulses.segment import Int64Array
 
 FULL = 256  # PWM counts of full current
 CYCLE = 256  # places of 1/64 step in an electrical cycle
@@ -36,6 +41,7 @@ class Duties(NamedTuple):
 
 
 NOTHING = Duties(0, 0, 0, 0)
+ENDS = tuple(name.upper() for name in Duties._fields)
 
 
 def table(mode: int, rotor: int) -> Duties:
@@ -69,6 +75,7 @@ _TABLES = (
     tuple(_row(rotor // STEP * 2 + 1) for rotor in range(CYCLE)),
     tuple(_micro(rotor) for rotor in range(CYCLE)),
 )
+_ARRAYS = tuple(np.array(rows, np.int64) for rows in _TABLES)
 
 
 class Drive(NamedTuple):
@@ -87,6 +94,11 @@ class Drive(NamedTuple):
     def __deepcopy__(self, _: object) -> "Drive":
         return self
 
+    @property
+    def ends(self) -> Sequence[str]:
+        """What `Duties` are the counts of."""
+        return ENDS
+
     def duties(self, position: int, rate: int) -> Duties:
         """The PWM counts at a position, in microsteps, and a rate, in microsteps/s."""
         place = position * self.size
@@ -96,6 +108,15 @@ class Drive(NamedTuple):
             return NOTHING
         full = table(self.mode, place)
         return full if self.sixteenths == 16 else Duties(*(count * self.sixteenths // 16 for count in full))
+
+    def duties_at(self, positions: Int64Array, rates: Int64Array) -> Int64Array:
+        """`duties` for many positions and rates: a row each."""
+        places = positions * self.size % CYCLE
+        counts: Int64Array = _ARRAYS[self.mode][places] * self.sixteenths // 16
+        if self.auto >= 0:
+            fast = rates // 256 > self.auto
+            counts[fast] = _ARRAYS[self.auto_mode][places[fast]]
+        return counts
 
     def step_mode(self, rate: int) -> int:
         """The mode in force at a rate."""

@@ -1,8 +1,8 @@
 """Application pages of the datasheet: resistors for the phase currents, and the speed that a load needs.
 
-The drive's current input is a divider: 10 kilo-ohm to 5 V inside, a resistor to ground inside, R3 beside it always, R2 too at
-rest (Tr2), R1 to 5 V while ramping (Tr1). Two amperes a volt make the datasheet's formula for R3 with the 1.2 kilo-ohm of
-the GS-D200.
+The drive's current input is a divider: 10 kilo-ohm to 5 V inside, a resistor to ground inside, R3 beside it always,
+R2 too at rest (Tr2), R1 to 5 V while ramping (Tr1). Two amperes a volt make the datasheet's formula for R3 with the
+1.2 kilo-ohm of the GS-D200.
 """
 
 from math import pi
@@ -13,10 +13,13 @@ PULL_UP = 10_000.0  # ohm, inside
 TO_GROUND = {"GS-D200": 1_200.0, "GS-D200S": 750.0}  # ohm, inside
 AMPS_PER_VOLT = 2.0
 
-CONFLICT = 'the datasheet prints R1 = 4245 ohm "assuming the GS-D200S is used"; that is the value for the 1.2 kilo-ohm of the GS-D200'
+CONFLICT = (
+    'the datasheet prints R1 = 4245 ohm "assuming the GS-D200S is used"; that is the value for the 1.2 kilo-ohm of '
+    "the GS-D200"
+)
 SLEW_CONFLICT = (
-    "the datasheet prints F L / (6000 t) = T N / 10, whose units do not agree; used here: F L / (6600 t) = 2 pi T N / 6 336 000 "
-    "(1 hp = 33 000 ft lb/min)"
+    "the datasheet prints F L / (6000 t) = T N / 10, whose units do not agree; used here: "
+    "F L / (6600 t) = 2 pi T N / 6 336 000 (1 hp = 33 000 ft lb/min)"
 )
 
 
