@@ -63,7 +63,7 @@ class Signals:
         for order, (unit, entry) in enumerate(recording):
             if type(entry) not in _MOTION and entry.at <= until:
                 logs[unit].take(order, entry)
-        found = []
+        found: list[UnitSignals] = []
         for log in logs:
             first, *others = log.view.axes
             name = log.view.name
@@ -156,7 +156,7 @@ class UnitSignals:
         return Pulses(*(np.concatenate(parts) if parts else none for parts in (times, directions, positions)))
 
     def runs(self, begin: Ns, end: Ns) -> Iterator[tuple[Span, int, int]]:
-        """The motions that gave pulses with begin <= time < end, with the numbers of the first and the last of these."""
+        """The motions that gave pulses with begin <= time < end, and the numbers of the first and last of these."""
         for index in range(bisect_left(self._ends, begin), len(self.spans)):
             span = self.spans[index]
             if span.begins >= end:

@@ -5,6 +5,7 @@
 
 from bisect import bisect_right
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
@@ -134,7 +135,7 @@ class Driven:
         counts = np.zeros((len(times), len(self.pins)), np.int64)
         which = np.searchsorted(self._since, times, side="right") - 1
         cuts = [0, *(np.flatnonzero(np.diff(which)) + 1).tolist(), len(times)]
-        for low, high in zip(cuts, cuts[1:], strict=False):
+        for low, high in pairwise(cuts):
             setting = self._settings[int(which[low])] if which[low] >= 0 else None
             if isinstance(setting, DriveSet):
                 counts[low:high] = setting.drive.duties_at(places[low:high] - setting.origin, rates[low:high])

@@ -68,7 +68,7 @@ def test_m_turns_through_rest_and_its_ramp_is_complete_only_then() -> None:
     bench.say("M 1000\r")
     before = len(bench.out)
     bench.run_to(bench.now + 10 * MS)
-    assert not [o for o in bench.out[before:] if type(o).__name__ == "Sent" and o.char.value == 10]
+    assert not [o for o in bench.out[before:] if isinstance(o, Sent) and o.char.value == 10]
     bench.run_to(bench.now + SECOND)
     assert [o.direction for o in bench.of(MotionStarted)][-1] == 1
     assert {o.direction for o in bench.of(MotionStarted)} == {1, -1}

@@ -188,6 +188,7 @@ class Player:
 
     def levels(self, name: str) -> list[int]:
         unit, pin = self.place(name)
+        assert self.cell.recording is not None
         return [e.level for e in self.cell.recording.of(unit) if isinstance(e, PinSet) and e.pin == pin]
 
     def do_expect(self, rest: str) -> None:
