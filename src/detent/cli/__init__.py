@@ -14,7 +14,7 @@ VERBS = {
     "asm": ("detent.cli.assemble:asm", "Assemble a program: labels and comments in, commands or an image out."),
     "list": ("detent.cli.assemble:list_", "List a program source with the address and bytes of every instruction."),
     "disasm": ("detent.cli.assemble:disasm", "Turn a program image back into source, with labels for its jumps."),
-    "motor": ("detent.cli.motor:motor", "Say what a motor makes of its pulses: torque against speed, or a move judged."),
+    "motor": ("detent.cli.motor:motor", "Say what a motor makes of its pulses: torque against speed, a move judged."),
     "table": ("detent.cli.table:table", "Compile a curve into the table of differences of a SUPERSIGMA drive."),
     "size": ("detent.cli.size:size", "Compute supplies and currents for a controller, as its manual does."),
     "wiring": ("detent.cli.wiring:wiring", "Find a motor's windings from the resistances between its leads."),

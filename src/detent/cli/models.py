@@ -89,10 +89,10 @@ def _print_tables(model: "Model") -> None:
         if not rows:
             continue
         table = Table(title=title.capitalize(), title_justify="left", box=None, pad_edge=False, header_style="dim")
-        for column in rows[0]:
-            if column != "section":
-                table.add_column(column, overflow="fold")
+        columns = [c for c in rows[0] if c != "section" and any(row[c] not in (None, 0) for row in rows)]
+        for column in columns:
+            table.add_column(column, overflow="fold")
         for row in rows:
-            table.add_row(*("" if v is None else str(v) for c, v in row.items() if c != "section"))
+            table.add_row(*("" if row[c] is None else str(row[c]) for c in columns))
         console.print()
         console.print(table)

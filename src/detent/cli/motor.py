@@ -34,7 +34,7 @@ def motor(
     plot: Path | None = None,
     json: bool = False,
 ) -> None:
-    """Say what a motor makes of its pulses: torque against speed, or a move judged.
+    """Say what a motor makes of its pulses: torque against speed, a move judged.
 
     Without a name: the motors there are. Speeds are in steps/s of the stepping in use, as a controller counts them.
 

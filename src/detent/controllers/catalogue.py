@@ -253,8 +253,9 @@ def _within(low: int, high: int) -> Callable[[str], int]:
 
 _YES_NO = _choice(no=False, yes=True, false=False, true=True)
 _RATE = _within(1, 62_500)
+_BAUD = _choice(**{"2400": 2400, "4800": 4800, "9600": 9600})
 _GENSTEPPER_OPTIONS = (
-    Option("step_size", "step_size", _within(1, 64), "1 to 64", "4", "microstep after power-on, in 1/64 of a full step"),
+    Option("step_size", "step_size", _within(1, 64), "1 to 64", "4", "microstep after power-on, 1/64 of a full step"),
     Option("stop_rate", "stop_rate", _RATE, "1 to 62500", "80", "stop OK rate (K) after a reset, microsteps/s"),
     Option("ramp", "ramp", _RATE, "1 to 62500", "8000", "ramp rate (P) after a reset, microsteps/s/s"),
     Option("run_rate", "run_rate", _RATE, "1 to 62500", "800", "run rate (R) after a reset, microsteps/s"),
@@ -267,8 +268,8 @@ _GENSTEPPER_OPTIONS = (
     Option("e_mode", "e_mode", _within(0, 255), "0 to 255, as E", "0", "direct pulse control after a reset"),
     Option("double_current", "double_current", _YES_NO, "yes or no", "no", "one motor on both connectors, without R1K"),
     Option("slew_inputs", "slew_inputs", _YES_NO, "yes or no (NOSLEW)", "yes", "the slew inputs slew"),
-    Option("dual_baud", "dual_baud", _YES_NO, "yes or no (DUALBAUD)", "no", "the half power jumper quarters the baud rate"),
-    Option("baud", "baud", _choice(**{"2400": 2400, "4800": 4800, "9600": 9600}), "2400, 4800 or 9600", "9600", "rate of the line"),
+    Option("dual_baud", "dual_baud", _YES_NO, "yes or no (DUALBAUD)", "no", "the S1K jumper quarters the baud rate"),
+    Option("baud", "baud", _BAUD, "2400, 4800 or 9600", "9600", "rate of the line"),
 )  # fmt: skip
 
 

@@ -341,3 +341,22 @@ def test_a_trip_without_a_program_does_nothing() -> None:
     bench = Bench()
     bench.do("P 128", "A 8", "P", "T 10 128", "+ 40")
     assert not [o for o in bench.of(PinSet) if o.pin == "P4" and o.level == 0]
+
+
+def test_on_a_party_line_what_an_input_or_a_start_sets_going_has_its_deadlines() -> None:
+    """The Go input (page 24) and the step input (page 10), with nothing else under way."""
+    for begin in ("GO", "start", "STEP"):
+        bench = Bench(straps={"PARTY": 1})
+        bench.say("\n")
+        for line in ("P 0", "+ 40", "P"):
+            bench.say(f"A{line}\n")
+            bench.run_to(bench.now + SECOND)
+        if begin == "start":
+            bench.unit.start(bench.now)
+        else:
+            bench.pin(begin, 0)
+            bench.run_to(bench.now + MS)
+            bench.pin(begin, 1)
+        assert bench.unit.next_deadline() is not None
+        bench.run_to(bench.now + 2 * SECOND)
+        assert bench.position == (1 if begin == "STEP" else 40), begin

@@ -125,10 +125,10 @@ class Dcb274:
             entry = self._entry
             if parity_ok and framing_ok and isinstance(entry, NamedEntry) and entry.skips(value):
                 return
-        self._quiet = False
         self.advance(now)
         for char in chars:
             if self._powered:
+                self._quiet = False
                 sound = char.parity_ok and char.framing_ok
                 self._receive(char.value if sound else 0xFF, now)
                 self._poll(now)
@@ -148,8 +148,8 @@ class Dcb274:
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
         """An input takes a level. PARTY counts at the next reset, the jumpers at the next power-on."""
-        self._quiet = False
         self.advance(now)
+        self._quiet = False
         if pin in self._straps:
             self._straps[pin] = level
             return
@@ -300,8 +300,8 @@ class Dcb274:
 
     def start(self, now: Ns) -> None:
         """Start the program that was loaded, as G would; nothing happens while one runs, or without power."""
-        self._quiet = False
         self.advance(now)
+        self._quiet = False
         if self._powered and not self._running.active:
             self._running.go(self._base, False, now)
 

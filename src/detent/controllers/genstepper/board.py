@@ -34,9 +34,9 @@ class Phase(Enum):
 
 
 class Board:
-    """What there is of a board without its commands; `order` are fields of `pins.Order`.
+    """A board without its commands: all of its state, and what moves it from outside but characters.
 
-    Straps that are not named are open, JS installed.
+    Straps that are not named are open, JS installed; `order` are fields of `pins.Order`.
     """
 
     def __init__(
@@ -314,7 +314,7 @@ class Board:
             found = found._replace(sixteenths=(16 if halves == 2 else 8 if halves else 0))
         return DriveSet(now, connector, axis, motor.origin, found)
 
-    # -- memory ------------------------------------------------------------------------------------
+    # -- what `?` reads of it ----------------------------------------------------------------------------
 
     def _memory(self, address: int, now: Ns) -> int:
         match address:
@@ -334,7 +334,7 @@ class Board:
                 return self._step_size
         return 0
 
-    # -- output that waits --------------------------------------------------------------------------
+    # -- output that waits -------------------------------------------------------------------------------
 
     def _cancel(self) -> None:
         """A new character begins, or has come: output that has not begun is dropped, and so is the prompt of an I."""

@@ -42,8 +42,8 @@ class Scope(Enum):
     """What a command is about."""
 
     BOARD = "board"  # whatever motors are selected
-    MOTORS = "selected motors"
-    CHOICE = "selects motors"
+    MOTORS = "motors"  # that are selected
+    CHOICE = "choice"  # of motors
 
 
 class Row(NamedTuple):
@@ -113,7 +113,7 @@ def reference(model: str) -> Sequence[CommandHelp]:
     rows = [
         CommandHelp(
             found.character, found.value, 0, found.scope.value,
-            "always; E mode misses edges of 16 us" if found.blinds else "always",
+            "always; blinds E" if found.blinds else "always",
             found.help, f"page{'s' if '-' in found.pages else ''} {found.pages}",
         )
         for found in TABLE
