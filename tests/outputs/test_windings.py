@@ -9,7 +9,7 @@ from tests.controllers.genstepper.boards import READY, Board
 from tests.outputs.test_vcd import parse, signed
 
 from detent.controllers.device import DriveSet
-from detent.outputs import arrays, sigrok, vcd
+from detent.outputs import arrays, figures, sigrok, vcd
 from detent.outputs.signals import Signals, of_cell
 from detent.outputs.windings import duties
 from detent.ticks import MS, SECOND
@@ -166,6 +166,15 @@ def test_sigrok_has_the_windings_of_both_axes_as_levels(tmp_path):
         places = (np.flatnonzero(np.diff(levels)) + 1).tolist()
         assert places == [-(-at // 16_000) for at, _ in edges[1:]]
         assert levels[places].tolist() == [level for _, level in edges[1:]]
+
+
+def test_a_figure_has_a_strip_for_the_power_of_each_motor():
+    board, seen = played(["B2WX320G", "1HX0G"])
+    strips = {lane.label: lane for lane in figures.chosen_lanes(seen) if isinstance(lane, figures.Strip)}
+    assert list(strips) == ["board.X power", "board.Y power"]
+    assert [band.label for band in strips["board.X power"].bands] == ["half", "full", "half", "quarter"]
+    assert [band.label for band in strips["board.Y power"].bands] == ["half", "quarter"]
+    assert strips["board.Y power"].bands[-1].end == board.cell.now
 
 
 def test_positions_of_the_second_axis_are_in_the_vcd():

@@ -65,6 +65,10 @@ class Drive(Protocol):
     def ends(self) -> Sequence[str]:
         """The winding ends, named as their pins less the name of the connector before them."""
 
+    @property
+    def power(self) -> str:
+        """How much current they get, in a word or two."""
+
     def duties(self, position: int, rate: int) -> Sequence[int]:
         """PWM counts of the winding ends, at a position in microsteps and a rate in microsteps/s."""
 

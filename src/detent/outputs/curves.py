@@ -16,6 +16,7 @@ from detent.cell.recording import Span
 from detent.controllers.device import Executing, Finished, Powered
 from detent.outputs.signals import Pulses, Signals, UnitSignals
 from detent.outputs.waves import Levels, Wave
+from detent.outputs.windings import Driven
 from detent.pulses import Accelerating, Uniform
 from detent.pulses.segment import Int64Array
 from detent.ticks import Fixed, Ns, round_fixed, to_fixed
@@ -139,6 +140,12 @@ def instructions(signals: Signals, name: str) -> list[Band]:
     if current is not None:
         bands.append(Band(current.at, signals.until, current.instruction))
     return bands
+
+
+def powers(driven: Driven, until: Ns) -> list[Band]:
+    """The power of the windings at a connector, as long as they have any."""
+    told = [*(one for one in driven.powers() if one[0] < until), (until, "")]
+    return [Band(at, end, power) for (at, power), (end, _) in pairwise(told) if power != "off"]
 
 
 _NO_PULSES = Pulses(*[np.empty(0, np.int64)] * 3)

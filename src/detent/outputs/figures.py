@@ -114,12 +114,16 @@ def timeline_figure(
 
 
 def chosen_lanes(signals: Signals) -> list[Pin | Strip]:
-    """A strip for every unit that executed a program; then pins that change, but no step clocks and serial wires."""
+    """Strips for programs that were executed and for windings; then pins that change, no step clocks or serial wires."""
     strips: list[Pin | Strip] = []
     for unit in signals.units:
         bands = curves.instructions(signals, unit.name)
         if bands:
             strips.append(Strip(unit.name, f"{unit.name} program", "instruction being executed", bands))
+        for driven in dict.fromkeys(unit.windings.values()):
+            about = f"power of the windings at {driven.connector}; white: off"
+            strips.append(Strip(unit.name, f"{unit.name}.{driven.connector} power", about,
+                                curves.powers(driven, signals.until)))  # fmt: skip
     pins: list[Pin | Strip] = []
     for unit in signals.units:
         clocks = set(unit.view.pulse_output.pins.values()) if unit.view.pulse_output is not None else set()

@@ -68,6 +68,7 @@ class Driven:
 
         ValueError for a connector of which no drive was recorded.
         """
+        self.connector = connector
         self._settings = _settings(recording, unit, connector)
         told = next((entry for entry in self._settings if isinstance(entry, DriveSet)), None)
         if told is None:
@@ -87,6 +88,17 @@ class Driven:
         index = int(np.searchsorted(self._begins, t, side="right")) - 1
         rate = int(self._axis.spans[index].train.state_at(t).rate) if index >= 0 else 0
         return setting.drive.duties(self._axis.position(t) - setting.origin, rate)
+
+    def powers(self) -> list[tuple[Ns, str]]:
+        """When the power of the drive changes, and to what; "off" without supply."""
+        found: list[tuple[Ns, str]] = []
+        for setting in self._settings:
+            power = setting.drive.power if isinstance(setting, DriveSet) else "off"
+            if found and found[-1][0] == setting.at:
+                found.pop()
+            if not found or found[-1][1] != power:
+                found.append((setting.at, power))
+        return found
 
     def changes(self, begin: Ns, end: Ns) -> Changes:
         """All steps and settings with begin <= time < end."""

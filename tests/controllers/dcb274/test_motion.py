@@ -343,6 +343,21 @@ def test_a_trip_without_a_program_does_nothing() -> None:
     assert not [o for o in bench.of(PinSet) if o.pin == "P4" and o.level == 0]
 
 
+def test_steps_of_an_encoder_trip_nothing_steps_of_the_step_input_do() -> None:
+    """Page 49: "The trip is not currently usable in the encoder mode"."""
+    for encoder in (False, True):
+        bench = Bench(encoder=encoder)
+        bench.do("P 128", "A 8", "P", "T 2 128", "P 0", "W 1000", "P")
+        bench.say("G\r")
+        bench.run_to(bench.now + 100 * MS)
+        for turn in range(4):
+            pin, level = (("STEP", 0), ("DIR" if encoder else "STEP", 1 - encoder))[turn % 2]
+            bench.pin(pin, level if turn < 2 or not encoder else 1)
+            bench.run_to(bench.now + MS)
+        assert bench.position >= 2
+        assert [o.level for o in bench.of(PinSet) if o.pin == "P4"][1:] == ([] if encoder else [0]), encoder
+
+
 def test_on_a_party_line_what_an_input_or_a_start_sets_going_has_its_deadlines() -> None:
     """The Go input (page 24) and the step input (page 10), with nothing else under way."""
     for begin in ("GO", "start", "STEP"):

@@ -405,4 +405,5 @@ class Motion:
         if self._ports.pulses_are_wired:
             self._ports.pulse(now)
         self.rested_at = now
-        return News(False, self._trip is not None and self.position(now) == self._trip)
+        # "The trip is not currently usable in the encoder mode" (page 49)
+        return News(False, not self._encoder and self._trip is not None and self.position(now) == self._trip)

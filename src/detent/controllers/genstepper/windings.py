@@ -42,6 +42,7 @@ class Duties(NamedTuple):
 
 NOTHING = Duties(0, 0, 0, 0)
 ENDS = tuple(name.upper() for name in Duties._fields)
+POWERS = {0: "off", 4: "quarter", 8: "half", 16: "full"}
 
 
 def table(mode: int, rotor: int) -> Duties:
@@ -98,6 +99,11 @@ class Drive(NamedTuple):
     def ends(self) -> Sequence[str]:
         """What `Duties` are the counts of."""
         return ENDS
+
+    @property
+    def power(self) -> str:
+        """The part of the full power; below the auto full step rate, where there is one."""
+        return POWERS.get(self.sixteenths, f"{self.sixteenths}/16")
 
     def duties(self, position: int, rate: int) -> Duties:
         """The PWM counts at a position, in microsteps, and a rate, in microsteps/s."""
