@@ -7,6 +7,7 @@ from zipfile import ZipFile
 import pytest
 
 from detent.cli import main
+from detent.motors.motor import MotorError
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DRILLING = str(EXAMPLES / "drilling" / "cell.toml")
@@ -149,3 +150,16 @@ def test_straps_and_options_of_a_cells_unit_are_changed_by_name(capsys: pytest.C
     assert found["units"]["bar"]["position"] == 980  # type: ignore[index,call-overload]
     slower = found["time_ns"]
     assert slower > result(capsys, DRILLING)["time_ns"]  # type: ignore[operator]
+
+
+def test_a_motor_that_breaks_the_equations_ends_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    def breaks(*_: object, **__: object) -> None:
+        raise MotorError("the rotor runs away")
+
+    monkeypatch.setattr("detent.cli.run._write", breaks)
+    assert detent("run", "gs-c200", "--plot", str(tmp_path / "a.png")) == 1
+    monkeypatch.setattr("detent.cli.run._run_on", breaks)
+    assert detent("run", "gs-c200") == 1
+    assert capsys.readouterr().err.splitlines() == ["detent: the rotor runs away"] * 2

@@ -111,3 +111,38 @@ def test_the_verb_lists_pages_questions_and_answers(capsys):
 def test_a_wrong_question_ends_with_2_and_a_remedy(words, capsys):
     assert run(*words) == 2
     assert capsys.readouterr().err
+
+
+def test_dcb_274_currents_are_percents_of_4_amperes_and_the_supply_is_twice_the_winding_at_least(capsys):
+    """Page 5: "Y 25 50" equals 1 A hold and 2 A run; page 52: 100 is 4 A; page 64: twice the winding rating."""
+    assert run("dcb-274", "current=2A", "resistance=7", "--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["hold_percent"], facts["run_percent"], facts["run_a"]) == (25, 50, 2)
+    assert facts["supply_v"] == {"least": 28, "most": 40}
+    assert run("dcb-274", "current=3.2", "resistance=1", "hold=0") == 0  # the quiet mode of page 53
+    assert "Y 0 80" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("speed", "decay"), [(90, 25), (180, 50), (360, 100), (720, 200)])
+def test_dcb_274_page_36_thresholds_in_eighths(speed, decay, capsys):
+    """The column of 1/8 SPS: b 25 is 2400, 50 4800, 100 9600, 200 19 200."""
+    assert run("dcb-274", "current=2", "resistance=1", f"speed={speed}", "resolution=1/8", "--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["decay"], facts["decay_steps_per_s"]) == (decay, 96 * decay)
+
+
+@pytest.mark.parametrize(
+    ("words", "warning"),
+    [
+        (["current=5", "resistance=1"], "Y 100"),
+        (["current=2", "resistance=1", "supply=48"], "never exceed 40 V"),
+        (["current=2", "resistance=1", "supply=12"], "advises against"),
+        (["current=2", "resistance=15"], "twice the 30 V"),
+        (["current=4", "resistance=4"], "100 VA"),
+        (["current=1", "resistance=4", "hold=2"], "smaller"),
+    ],
+)
+def test_dcb_274_warns_as_the_manual_does(words, warning, capsys):
+    assert run("dcb-274", *words) == 0
+    assert warning in capsys.readouterr().out
+    assert run("dcb-274", "current=0", "resistance=1") == 2

@@ -172,7 +172,7 @@ def test_a_figure_has_a_strip_for_the_power_of_each_motor():
     board, seen = played(["B2WX320G", "1HX0G"])
     strips = {lane.label: lane for lane in figures.chosen_lanes(seen) if isinstance(lane, figures.Strip)}
     assert list(strips) == ["board.X power", "board.Y power"]
-    assert [band.label for band in strips["board.X power"].bands] == ["half", "full", "half", "quarter"]
+    assert [band.label for band in strips["board.X power"].bands] == ["full", "half", "quarter"]
     assert [band.label for band in strips["board.Y power"].bands] == ["half", "quarter"]
     assert strips["board.Y power"].bands[-1].end == board.cell.now
 

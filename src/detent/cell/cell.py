@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.deeds import Action, Power, Send, SetPin, SetSwitch, Start
 from detent.cell.recording import InputSet, Log, Received, Recording
-from detent.controllers.device import Controller, Device, Output, Powered, StoreImage
+from detent.controllers.device import Controller, Device, DriveSet, Output, Powered, StageSet, StoreImage
 from detent.lines.line import EVERYBODY, Line
 from detent.pins import HIGH, LOW, Level, Net, PinSet
 from detent.ticks import NEVER, Ns
@@ -35,6 +35,9 @@ class Follower(Protocol):
 
     def follow(self, motion: MotionStarted | MotionCut | MotionEnded) -> None:
         """The axis does this."""
+
+    def heed(self, told: DriveSet | StageSet | Powered) -> None:
+        """The power stage of the unit is commanded so, or its supply is switched."""
 
 
 class Talker(Protocol):
@@ -316,13 +319,21 @@ class Cell:
                 for follower in self.wiring.followers[index]:
                     self.parts[follower].follow(item)  # type: ignore[attr-defined]
                     self._touched.add(follower)
+            elif kind is DriveSet or kind is StageSet:
+                for follower in self.wiring.followers[index]:
+                    self.parts[follower].heed(item)  # type: ignore[attr-defined]
+                    self._touched.add(follower)
             elif kind is StoreImage:
                 ok = self._outside.store(self.wiring.names[index], item.image)  # type: ignore[union-attr]
                 self.parts[index].stored(ok, self.now)
                 self._touched.add(index)
-            elif kind is Powered and not item.on:  # type: ignore[union-attr]
-                for pin, net in drives.items():
-                    self._drive(net, (index, pin), HIGH)
+            elif kind is Powered:
+                for follower in self.wiring.followers[index]:
+                    self.parts[follower].heed(item)  # type: ignore[attr-defined]
+                    self._touched.add(follower)
+                if not item.on:  # type: ignore[union-attr]
+                    for pin, net in drives.items():
+                        self._drive(net, (index, pin), HIGH)
 
     def _drive(self, net: int, driver: tuple[int, str], level: Level) -> None:
         wire = self.nets[net]

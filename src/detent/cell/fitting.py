@@ -3,15 +3,17 @@
 from collections.abc import Mapping, Sequence
 from math import inf
 
+from detent.cell.contacts import PINS, Contact, Detector
 from detent.cell.description import Description, Motor, Problem, Switch
-from detent.cell.mechanics import PINS, Contact, Detector, Mechanics
+from detent.cell.mechanics import Mechanics
 from detent.motors.drive import Currents, Drive
 from detent.motors.fit import fitted
 from detent.motors.load import Load
+from detent.motors.motor import Motor as Rated
 from detent.motors.motor import MotorError
 from detent.motors.named import motor as named
 from detent.motors.rotor import Rig
-from detent.motors.winding import winding
+from detent.motors.winding import COMMANDED, GRID, Winding, winding
 
 HALF_A_STEP = 0.5
 
@@ -43,11 +45,13 @@ def mechanics(
     """The mechanics of the motor `name`, with the switches that its rotor moves. Raises Problem."""
     entry = description.motors[name]
     try:
-        rig = _rig(entry)
+        model = "" if entry.unit is None else description.units[entry.unit].model
+        rig = _rig(entry, COMMANDED.get(model, ()))
+        step = GRID // winding(entry.step).steps if "step" in entry.model_fields_set else None
         contacts = [_contact(switch, place, entry) for switch, place in switches.items()]
         detector = Detector(entry.window)
         return Mechanics(rig, axis=entry.axis, shaft=float(shaft), reverse=entry.reverse, contacts=contacts,
-                         detector=detector, record=record)  # fmt: skip
+                         detector=detector, record=record, step=step)  # fmt: skip
     except MotorError as error:
         raise Problem(description.file, f"motors.{name}", str(error)) from None
 
@@ -63,7 +67,7 @@ def check_names(description: Description, taken: Sequence[str]) -> None:
             raise Problem(description.file, f"switches.{name}", "a pin of every motor has this name: choose another")
 
 
-def _rig(entry: Motor) -> Rig:
+def _rig(entry: Motor, sequences: tuple[Winding, ...]) -> Rig:
     found = fitted(entry.motor).motor if entry.fitted else named(entry.motor)
     if entry.data:
         found = found.changed(**entry.data)
@@ -79,8 +83,28 @@ def _rig(entry: Motor) -> Rig:
             currents = Currents(1.0, 1.0, current.hold / amps, max(current.after, 1))
         else:
             currents = Currents(current.ramp / amps, current.slew / amps, current.rest / amps)
+    if sequences:
+        return _commanded(entry, found, load, sequences, amps)
     return Rig(found, Drive(entry.supply, amps, winding(entry.step), entry.decay, entry.threshold, currents, entry.drop,
                             entry.resistance), load)  # fmt: skip
+
+
+def _commanded(entry: Motor, found: Rated, load: Load, sequences: tuple[Winding, ...], amps: float) -> Rig:
+    """With a controller that commands the power stage: what stands here is the base of that.
+
+    A DCB-274 commands amperes. The boards have no feedback: full power is the supply (BS0610 manual, page 64).
+    """
+    finest = max(sequences, key=lambda table: len({*zip(table.a, table.b, strict=True)}))
+    decay = entry.decay
+    given = entry.model_fields_set
+    if sequences == COMMANDED["dcb-274"]:
+        amps = max(found.current, 1.0)
+    elif "decay" not in given:
+        decay = "voltage"
+        if "current" not in given:
+            amps = (entry.supply - entry.drop) / (found.resistance + entry.resistance)
+    drive = Drive(entry.supply, amps, finest, decay, entry.threshold, drop=entry.drop, resistance=entry.resistance)
+    return Rig(found, drive, load, sequences=sequences)
 
 
 def _contact(name: str, entry: Switch, motor: Motor) -> Contact:

@@ -8,168 +8,26 @@ thrown away.
 """
 
 from collections.abc import Sequence
-from copy import copy, deepcopy
-from math import ceil, floor, inf
-from typing import Any, NamedTuple
+from copy import deepcopy
+from math import floor, inf
+from typing import Any
 
 import numpy as np
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.cell.contacts import DETECTOR, PINS, QUADRATURE, Contact, Detector
+from detent.cell.course import SAMPLE, SLICE, Course, crossing_time, row_of
+from detent.cell.power import Power
 from detent.cell.recording import Log
-from detent.controllers.device import Output
+from detent.controllers.device import DriveSet, Output, Powered, StageSet
 from detent.motors import kernel
 from detent.motors.drive import FAST, SLOW
-from detent.motors.excitation import NOTHING, Changes, Sequencer, at_once
+from detent.motors.excitation import Sequencer, at_once
+from detent.motors.motor import MotorError
 from detent.motors.rotor import Floats, Rig, Rotor
-from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind
-from detent.ticks import MS, NEVER, US, Ns
+from detent.pins import HIGH, LOW, Level, Pin, PinDriver
+from detent.ticks import NEVER, Ns
 from detent.uart import Char
-
-SLICE: Ns = 20 * MS  # a rotor is asked so often whether it has come to rest, and looked ahead so far
-LONGEST_SWING: Ns = 1000 * MS  # behind the last pulse; a rotor that swings on (nothing damps it) is then taken to rest
-STILL = 1e-3  # rad/s: slower is at rest
-SAMPLE: Ns = 50 * US  # of the trace
-CHUNK = 1 << 14  # pulses in one go
-
-PINS: tuple[Pin, ...] = (
-    Pin("MOV", None, PinKind.INPUT, "drive: 0 takes the current to rest (of a GS-C200)"),
-    Pin("RAMP", None, PinKind.INPUT, "drive: 0 takes the current from ramp to slew"),
-    Pin("ENABLE", None, PinKind.INPUT, "drive: 0 switches the windings off"),
-    Pin("DECAY", None, PinKind.INPUT, "drive: 1 slow decay, 0 fast; not wired: as the drive is set"),
-    Pin("HALF", None, PinKind.INPUT, "drive: 1 each pulse one place of the sequence, 0 two (full steps)"),
-    Pin("CLOCK", None, PinKind.INPUT, "drive without a unit: a falling edge is a step"),
-    Pin("DIR", None, PinKind.INPUT, "drive without a unit: 1 = plus"),
-    Pin("DONE", None, PinKind.OUTPUT, "step detector: 1 while the rotor has made every step it was asked for"),
-    Pin("X", None, PinKind.OUTPUT, "encoder on the rotor, a quarter cycle a step, ahead of Y in the direction plus"),
-    Pin("Y", None, PinKind.OUTPUT, "encoder on the rotor"),
-)
-_QUADRATURE = ((LOW, LOW), (HIGH, LOW), (HIGH, HIGH), (LOW, HIGH))
-
-
-class Contact(NamedTuple):
-    """A switch on the axis: at `inside` while the rotor is between `low` and `high`, in steps (or for ever)."""
-
-    name: str
-    low: float
-    high: float
-    inside: Level
-
-    @property
-    def pin(self) -> Pin:
-        """Its contact, as a pin of the mechanics."""
-        return Pin(self.name, None, PinKind.OUTPUT, "contact on the axis")
-
-    def side(self, place: float) -> int:
-        """Where the rotor is: -1 below, 0 within, 1 above."""
-        return -1 if place < self.low else 1 if place > self.high else 0
-
-    def level(self, side: int) -> Level:
-        """The level of the contact there."""
-        return HIGH + LOW - self.inside if side else self.inside
-
-    def __deepcopy__(self, _: object) -> "Contact":
-        return self
-
-
-class Detector(NamedTuple):
-    """The step detector: a step is made when the rotor is less than `window` steps short of it; told `delay` later."""
-
-    window: float = 0.5
-    delay: Ns = 1 * US
-
-    def __deepcopy__(self, _: object) -> "Detector":
-        return self
-
-
-DETECTOR = Detector()
-
-
-class Course:
-    """A rotor, the drive's memory, and the pulses that are to come: whatever changes as time goes on."""
-
-    __slots__ = ("anchor", "direction", "frozen", "last", "next", "rotor", "sequencer", "train")
-
-    def __init__(self, rotor: Rotor, sequencer: Sequencer) -> None:
-        self.rotor, self.sequencer = rotor, sequencer
-        self.train: Any = None
-        self.next, self.last, self.direction = 1, 0, 1  # pulses next .. last are to come
-        self.anchor: Ns = rotor.now  # the last change of excitation
-        self.frozen = True  # at rest, and not computed until something happens
-
-    def twin(self) -> "Course":
-        """A copy that goes its own way."""
-        made = copy(self)
-        made.rotor = self.rotor.__deepcopy__({})
-        made.sequencer = copy(self.sequencer)
-        return made
-
-    def __deepcopy__(self, _: object) -> "Course":
-        return self.twin()
-
-    def next_change(self) -> Ns:
-        """When the next pulse falls, or the drive changes something by itself."""
-        pulse = self.train.time_of(self.next) if self.next <= self.last else NEVER
-        return int(min(pulse, self.sequencer.slows_at, self.sequencer.holds_at))
-
-    def go(self, until: Ns, low: float = -inf, high: float = inf, trace: "Log[Floats] | None" = None) -> bool:
-        """Go on to `until`, changes of that instant included. True, somewhere before, if the rotor reaches an angle."""
-        while (at := self.next_change()) <= until:
-            if self._wait(at, low, high, trace):
-                return True
-            if self._run(self._due(at, until), low, high, trace):
-                return True
-        return self._wait(until, low, high, trace)
-
-    def change(self, changes: Changes, trace: "Log[Floats] | None") -> None:
-        """The excitation changes, now, for another reason than a pulse."""
-        self._run(changes, -inf, inf, trace)
-
-    def _due(self, at: Ns, until: Ns) -> Changes:
-        """What changes at `at`, and the pulses that follow it closely."""
-        if self.next > self.last or self.train.time_of(self.next) > at:
-            return self.sequencer.up_to(at)
-        end = min(self.train.steps_by(until), self.last, self.next + CHUNK - 1)
-        times = self.train.times(self.next, end)
-        apart = np.flatnonzero(np.diff(times) > SLICE)
-        if len(apart):
-            times = times[: int(apart[0]) + 1]
-        self.next += len(times)
-        return self.sequencer.pulses(times, self.direction)
-
-    def _run(self, changes: Changes, low: float, high: float, trace: "Log[Floats] | None") -> bool:
-        if self.frozen:
-            begin = max(self.rotor.now, int(changes.times[0]))
-            if trace is not None:
-                trace.append(_row(self.rotor, begin))
-            self.rotor.n[kernel.NOW] = begin
-            self.frozen = False
-        self.anchor = int(changes.times[-1])
-        return self._compute(changes, self.anchor, low, high, trace)
-
-    def _wait(self, until: Ns, low: float, high: float, trace: "Log[Floats] | None") -> bool:
-        """No change before `until`: slice after slice, until the rotor is at rest."""
-        slice_ = SLICE // self.rotor.rig.substep * self.rotor.rig.substep  # its ends are ends of substeps
-        while not self.frozen and self.rotor.now < until:
-            boundary = self.anchor + ((self.rotor.now - self.anchor) // slice_ + 1) * slice_
-            if self._compute(NOTHING, min(boundary, until), low, high, trace):
-                return True
-            if self.rotor.now < boundary:
-                break  # what is left before `until` is less than a substep
-            still = abs(self.rotor.speed) < STILL and abs(float(self.rotor.s[kernel.ACC])) < STILL * 1e3
-            if still or boundary - self.anchor >= LONGEST_SWING:
-                self.frozen = True
-                self.rotor.s[kernel.W] = self.rotor.s[kernel.ACC] = 0.0
-        return False
-
-    def _compute(self, changes: Changes, until: Ns, low: float, high: float, trace: "Log[Floats] | None") -> bool:
-        rows = None
-        if trace is not None:
-            self.rotor.n[kernel.TRACED] = 0
-            rows = np.empty(((until - self.rotor.now) // SAMPLE + 2, kernel.COLUMNS))
-        code = self.rotor.run(changes, until, low, high, rows)
-        if trace is not None and rows is not None and (done := int(self.rotor.n[kernel.TRACED])):
-            trace.append(rows[:done])
-        return code == kernel.CROSSED
 
 
 class Mechanics:
@@ -185,7 +43,9 @@ class Mechanics:
         contacts: Sequence[Contact] = (),
         detector: Detector = DETECTOR,
         record: bool = False,
+        step: int | None = None,
     ) -> None:
+        """Where the controller commands the sequence a place counts `step` 1/64 steps; None: as it is at first."""
         self.rig, self.axis, self.detector = rig, axis, detector
         self.contacts = tuple(contacts)
         self.pins: Sequence[Pin] = (*PINS, *(contact.pin for contact in self.contacts))
@@ -194,7 +54,9 @@ class Mechanics:
         sequencer = Sequencer(rig.drive)
         rotor = Rotor(rig, sequencer, 0, SAMPLE)
         self._course = Course(rotor, sequencer)
-        self._first = _row(rotor, 0)  # of the trace
+        self._zero, self._pitch, self._step = rig.drive.winding.offset, rig.drive.winding.pitch, step
+        self._supplied = True  # as far as the controller commands
+        self._first = row_of(rotor, 0)  # of the trace
         self._ahead: Course | None = None  # as far as a look ahead has come without finding anything
         self._watched: set[str] = set()
         self._inputs: dict[str, Level] = {pin.name: HIGH for pin in PINS if pin.kind.reads}
@@ -214,13 +76,11 @@ class Mechanics:
 
     def place_of(self, angle: Any) -> Any:
         """The place on the axis, in steps, of an electrical angle (or an array of them)."""
-        winding = self.rig.drive.winding
-        return self.shaft + self.sign * (angle - winding.offset) / winding.pitch
+        return self.shaft + self.sign * (angle - self._zero) / self._pitch
 
     def angle_of(self, place: float) -> float:
         """The electrical angle of a place on the axis."""
-        winding = self.rig.drive.winding
-        return winding.offset + self.sign * (place - self.shaft) * winding.pitch
+        return self._zero + self.sign * (place - self.shaft) * self._pitch
 
     def rotor_at(self, now: Ns) -> Rotor:
         """The rotor at `now`, everything of that instant included."""
@@ -239,6 +99,8 @@ class Mechanics:
         """Where the pulses want it, in steps."""
         course = self._course.twin()
         course.go(now)
+        if course.power is not None:
+            return float(self.place_of(self.rig.drive.winding.angle(course.sequencer.place)))
         return self.shaft + self.sign * course.sequencer.place
 
     def traced(self, now: Ns) -> Floats:
@@ -247,7 +109,7 @@ class Mechanics:
         assert log is not None
         course = self._course.twin()
         course.go(now, trace=log)
-        rows = [self._first, *log, _row(course.rotor, now)]
+        rows = [self._first, *log, row_of(course.rotor, now)]
         return np.concatenate(rows)
 
     # -- the contract of a device ----------------------------------------------------------------------------
@@ -298,7 +160,7 @@ class Mechanics:
             self._plan(now)
         elif pin in ("MOV", "RAMP", "ENABLE"):
             self._go_before(now)
-            sequencer.on = self._inputs["ENABLE"] == HIGH
+            sequencer.on = self._inputs["ENABLE"] == HIGH and self._supplied
             course.change(sequencer.set_level(self._level(), now), self.trace)
             self._plan(now)
 
@@ -313,13 +175,44 @@ class Mechanics:
             steps = motion.train.steps
             course.train, course.next = motion.train, motion.first
             course.last = NEVER if steps is None else steps
-            course.direction = self.sign * motion.direction
+            course.direction, course.way = self.sign * motion.direction, motion.direction
+            course.shaft = motion.shaft + motion.direction * (motion.first - 1)
             self._checked = motion.first - 1
+            if course.power is not None:
+                first = motion.train.time_of(motion.first)
+                course.change(course.power.begins(course.sequencer, motion.at, first), self.trace)
         else:
             course.last = min(course.last, motion.last)
             course.go(motion.at, trace=self.trace)
             self._checked = min(self._checked, course.last)
+            if course.power is not None and course.sequencer.moving:
+                course.change(course.power.ends(course.sequencer, motion.at), self.trace)
         self._plan(motion.at)
+
+    def heed(self, told: DriveSet | StageSet | Powered) -> None:
+        """The controller commands its power stage: from now on that counts, and not what the drive was set to."""
+        if not self.rig.sequences:
+            return
+        if not isinstance(told, Powered) and told.axis != self.axis:
+            return
+        if isinstance(told, DriveSet) and told.connector != self.axis:
+            return  # the second connector of an axis that drives two
+        self._go_before(told.at)
+        course, sequencer = self._course, self._course.sequencer
+        if isinstance(told, Powered):
+            if course.power is None:
+                return
+            self._supplied = told.on
+        else:
+            stage = told.drive.stage if isinstance(told, DriveSet) else told.stage
+            begins = course.power is None
+            course.power = Power(stage, 1 / self.rig.drive.current if stage.chops else 1.0)
+            course.power.take(sequencer, self.sign * (course.shaft - told.origin), course.rate(told.at))
+            if begins:
+                self._begin(stage.places, told.at)
+        sequencer.on = self._inputs["ENABLE"] == HIGH and self._supplied
+        course.change(sequencer.set_level(sequencer.level if sequencer.on else 0.0, told.at), self.trace)
+        self._plan(told.at)
 
     def next_deadline(self) -> Ns | None:
         """When a contact changes, or a look ahead must go on."""
@@ -354,11 +247,27 @@ class Mechanics:
         currents, inputs = self.rig.drive.currents, self._inputs
         if inputs["ENABLE"] == LOW:
             return 0.0
+        if self._course.power is not None:
+            return self._course.power.level(self._course.sequencer)
         if currents.after:
             return self._course.sequencer.own_level
         if inputs["RAMP"] == HIGH and inputs["MOV"] == HIGH:
             return currents.ramp
         return currents.slew if inputs["MOV"] == HIGH else currents.rest
+
+    def _begin(self, step: int, now: Ns) -> None:
+        """The controller commands for the first time: the rotor stands where that asks it to, at the start."""
+        winding, course = self.rig.drive.winding, self._course
+        self._zero = winding.angle(course.sequencer.place)
+        self._pitch = winding.pitch * (self._step or step)
+        level = course.sequencer.level
+        try:
+            course.rotor = Rotor(self.rig, course.sequencer, now, SAMPLE)
+        except MotorError:  # the load is more than what it is given at first: somebody holds it until then
+            course.sequencer.level = 1.0
+            course.rotor = Rotor(self.rig, course.sequencer, now, SAMPLE)
+            course.sequencer.level = level
+        self._first = row_of(course.rotor, now)
 
     def _set_decay(self, level: Level, now: Ns) -> None:
         sequencer = self._course.sequencer
@@ -413,7 +322,7 @@ class Mechanics:
             if ahead.go(horizon, low, high):
                 up = float(ahead.rotor.s[kernel.X_NEXT]) >= high
                 self._edge = (high if up else low), up
-                self._crossing = max(_crossing_time(ahead.rotor, *self._edge), now)
+                self._crossing = max(crossing_time(ahead.rotor, *self._edge), now)
             else:
                 self._horizon, self._ahead = horizon, ahead
         self._replan()
@@ -443,7 +352,7 @@ class Mechanics:
             self._driver.set("DONE", HIGH, now)
 
     def _tell_quarter(self, now: Ns) -> None:
-        x, y = _QUADRATURE[self._quarter % 4]
+        x, y = QUADRATURE[self._quarter % 4]
         self._driver.set("X", x, now)
         self._driver.set("Y", y, now)
 
@@ -462,7 +371,7 @@ class Mechanics:
         course = self._course
         self._checked += 1
         winding = self.rig.drive.winding
-        wanted = winding.angle(course.sequencer.place) - course.direction * self.detector.window * winding.pitch
+        wanted = winding.angle(course.sequencer.place) - course.direction * self.detector.window * self._pitch
         behind = course.direction * (wanted - course.rotor.angle)
         before, self._wanted = self._wanted, wanted if behind > 0 else None
         self._driver.set("DONE", HIGH if self._wanted is None else LOW, now)
@@ -470,25 +379,3 @@ class Mechanics:
             self._replan()
         else:
             self._plan(now)
-
-
-def _crossing_time(rotor: Rotor, edge: float, up: bool) -> Ns:
-    """When, within the substep that `advance` stopped before, the rotor reaches the edge: the first ns behind it."""
-    s = rotor.s
-    x0, w0, acc = float(s[kernel.X]), float(s[kernel.W]), float(s[kernel.ACC_NEXT])
-    first, last = 0.0, int(rotor.n[kernel.STEP]) * 1e-9
-    for _ in range(60):
-        middle = (first + last) / 2
-        x = x0 + rotor.rig.motor.teeth * middle * (w0 + 0.5 * acc * middle)
-        if (x >= edge) if up else (x <= edge):
-            last = middle
-        else:
-            first = middle
-    return rotor.now + ceil(last * 1e9)
-
-
-def _row(rotor: Rotor, at: Ns) -> Floats:
-    """A row of the trace: the state as it is, said to be that of `at`."""
-    s = rotor.s
-    phi = rotor.rig.drive.winding.angle(int(rotor.n[kernel.PLACE]))
-    return np.array([[at, s[kernel.X], s[kernel.W], s[kernel.IA], s[kernel.IB], phi]], np.float64)

@@ -7,7 +7,7 @@ nothing in between.
 from collections.abc import Sequence
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.controllers.device import Output
+from detent.controllers.device import DriveSet, Output, Powered, StageSet
 from detent.pins import HIGH, LOW, Level, Pin, PinKind, PinSet
 from detent.ticks import NEVER, Ns
 from detent.uart import Char
@@ -85,6 +85,9 @@ class AxisSwitch(Switch):
             self._plan(motion, motion.first)
         else:
             self.deadline = NEVER
+
+    def heed(self, told: DriveSet | StageSet | Powered) -> None:
+        """It counts pulses: the windings are nothing to it."""
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
         """A hand may hold the contact; the axis moves it on at its next edge."""

@@ -69,6 +69,7 @@ def run(
     from detent.cell.description import Problem
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
+    from detent.motors.motor import MotorError
     from detent.outputs.figures import check
     from detent.ticks import parse_duration
 
@@ -87,10 +88,12 @@ def run(
     try:
         exchanges = [_exchange(cell, unit, text) for unit, text in lines]
         ended = _run_on(cell, until)
-    except Oscillation as error:
+    except (Oscillation, MotorError) as error:
         failed(error)
     try:
         _write(cell, found, plot=plot, vcd=vcd, sr=sr, npz=npz)
+    except MotorError as error:
+        failed(error)
     except ValueError as error:
         asked_wrongly(error)
     except OSError as error:

@@ -192,6 +192,32 @@ def _gsc200_slew(given: Mapping[str, Any]) -> Answer:
     return Answer(lines, {"turns_per_min": turns, "steps_per_s": rate}, warnings)
 
 
+def _dcb274(given: Mapping[str, Any]) -> Answer:
+    from detent.controllers.dcb274.current import FULL_CURRENT
+    from detent.controllers.dcb274.sizing import MORE, MOST_SUPPLY, advise
+
+    found = advise(**given)
+    amps = FULL_CURRENT * found.run / 100
+    lines = [
+        Line("hold and run current", f"Y {found.hold} {found.run}: {FULL_CURRENT * found.hold / 100:.3g} and "
+             f"{amps:.3g} A a phase, 100 is {FULL_CURRENT:g} A; hold begins 1 s behind a move (page 52)"),
+        Line("the right run current", f"the least that works reliably (page 62), and {(MORE[0] - 1) * 100:.0f} to "
+             f"{(MORE[1] - 1) * 100:.0f} % more (page 64)"),
+        Line("supply", f"{found.least_supply:.3g} to {MOST_SUPPLY:g} V, unregulated; the higher the faster "
+             "(pages 11, 13, 64; page 2 prints 45 V)"),
+        Line("heat of the windings", f"{found.watts:.3g} W at run current"),
+        Line("decay", f"b {found.decay}: fast above {found.steps_per_s} steps/s, slow below and at rest (page 36)"),
+        Line("slow decay", "smooth, less resonance, less heat; poor regulation of low currents (pages 36, 65)"),
+        Line("fast decay", "better regulation, more heat; as a rule above 200 to 300 rev/min (pages 36, 65)"),
+    ]  # fmt: skip
+    facts = {
+        "hold_percent": found.hold, "run_percent": found.run, "run_a": amps, "rated_v": found.rated_volts,
+        "supply_v": {"least": found.least_supply, "most": MOST_SUPPLY}, "windings_w": found.watts,
+        "decay": found.decay, "decay_steps_per_s": found.steps_per_s,
+    }  # fmt: skip
+    return Answer(lines, facts, found.warnings)
+
+
 def _maybe(read: Callable[[str], Any]) -> Callable[[str], Any]:
     return lambda text: read(text) if text else None
 
@@ -228,6 +254,18 @@ _SLEW = (
     Quantity("steps", int, "a whole number", "200", "steps in a turn"),
 )
 
+_CHOPPER = (
+    Quantity("current", number_with("A"), "A", None, "rated, of one phase as it is connected"),
+    Quantity("resistance", number_with("ohm"), "ohm", None, "of one phase as it is connected"),
+    Quantity("supply", number_with("V"), "V", "40", "at J5"),
+    Quantity("hold", _maybe(number_with("A")), "A", "", "at rest, instead of half the run current"),
+    Quantity("speed", number_with("rpm"), "rev/min", "250", "at which decay changes"),
+    Quantity(
+        "resolution", one_of(**{"1/8": 0, "1/4": 1, "1/2": 2, "full": 3, "wave": 5}), "1/8, 1/4, 1/2, full or wave",
+        "1/4", "step table (H)",
+    ),
+)  # fmt: skip
+
 PAGES: dict[str, Page] = {
     "gs-c200-current": Page(
         "GS-C200 with a GS-D200: resistors for the phase currents by MOV and RAMP (datasheet, figure 11)",
@@ -237,4 +275,5 @@ PAGES: dict[str, Page] = {
     "gs-c200-slew": Page("GS-C200: slew speed of a load (datasheet, slew speed selection)", _SLEW, _gsc200_slew),
     "bs0610": Page("BS0610: power supply requirements (manual, pages 62 to 68)", _BOARD, _genstepper),
     "bs0710": Page("BS0710: power supply requirements (manual, pages 62 to 68)", _BOARD, _genstepper),
+    "dcb-274": Page("DCB-274: current, supply and decay (manual, pages 11, 13, 36, 52, 61 to 65)", _CHOPPER, _dcb274),
 }

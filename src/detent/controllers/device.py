@@ -58,8 +58,42 @@ class Powered(NamedTuple):
     on: bool
 
 
+class Stage(NamedTuple):
+    """What a controller commands of the power stage of an axis, in the terms of a motor.
+
+    Position p of the axis is the place `start` + `places` x (p - origin) of the electrical cycle, in 1/64 full steps.
+    """
+
+    sequence: int  # of phase currents, as the controller's command numbers them
+    places: int
+    start: int = 0
+    run: float = 1.0  # of full power; amperes a phase where `chops`
+    hold: float = 1.0  # the same, `settling` behind a motion; without settling `run` counts until it is told otherwise
+    settling: Ns = 0
+    chops: bool = False
+    slow_over: Ns | None = None  # decay is slow with pulses farther apart, and at rest; None: the drive's own business
+    fast_from: int | None = None  # rate from which on `fast_sequence` is in force, at full power
+    fast_sequence: int = 0
+
+    def __deepcopy__(self, _: object) -> "Stage":
+        return self
+
+
+class StageSet(NamedTuple):
+    """The power stage of `axis` is commanded so until it is set again; `origin` is the shaft at position 0."""
+
+    at: Ns
+    axis: str
+    origin: int
+    stage: Stage
+
+
 class Drive(Protocol):
     """How windings are driven, as a function of nothing but the position and the rate."""
+
+    @property
+    def stage(self) -> Stage:
+        """The same in the terms of a motor."""
 
     @property
     def ends(self) -> Sequence[str]:
@@ -90,7 +124,7 @@ class DriveSet(NamedTuple):
 
 
 Output: TypeAlias = (
-    Sent | PinSet | MotionStarted | MotionCut | MotionEnded | DriveSet
+    Sent | PinSet | MotionStarted | MotionCut | MotionEnded | DriveSet | StageSet
     | Executing | Finished | Refused | StoreImage | Powered
 )  # fmt: skip
 

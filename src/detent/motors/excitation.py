@@ -41,7 +41,8 @@ class Sequencer:
     by itself behind the last of them (standstill, hold current) comes with the next pulses, or with `up_to`.
     """
 
-    __slots__ = ("_base", "_held", "_slowed", "drive", "last", "level", "mode", "on", "place", "row", "stride")
+    __slots__ = ("_base", "_held", "_slowed", "drive", "last", "level", "measured", "mode", "moving", "on", "place",
+                 "row", "slows_by", "stride")  # fmt: skip
 
     def __init__(self, drive: Drive, place: int = 0, stride: int = 1) -> None:
         self.drive = drive
@@ -51,6 +52,9 @@ class Sequencer:
         self.stride = stride  # places a pulse
         self.level = drive.currents.rest if drive.currents.after else drive.currents.ramp
         self.last: Ns = -NEVER  # the last pulse
+        self.moving = False  # somebody outside says that a motion is under way: no hold current before its end
+        self.measured: Ns | None = None  # between the last two steps, if they come one by one from outside
+        self.slows_by: Ns = NEVER  # somebody outside says until when decay may be fast
         self._held = True
         self._slowed = True
 
@@ -100,12 +104,12 @@ class Sequencer:
     @property
     def slows_at(self) -> Ns:
         """When an `auto` drive notices that the motor stands."""
-        return NEVER if self._slowed else self.last + self.drive.standstill
+        return NEVER if self._slowed else min(self.slows_by, self.last + self.drive.standstill)
 
     @property
     def holds_at(self) -> Ns:
         """When the current falls to its hold value."""
-        return NEVER if self._held else self.last + self.drive.currents.after
+        return NEVER if self._held or self.moving else self.last + self.drive.currents.after
 
     @property
     def own_level(self) -> float:
@@ -115,6 +119,15 @@ class Sequencer:
     def set_mode(self, mode: int) -> None:
         """Somebody outside chooses the decay."""
         self._base = self.mode = mode
+        self._slowed = True
+
+    def set_fast(self, until: Ns) -> None:
+        """Decay is fast, and slow again at `until`."""
+        self.mode, self._slowed, self.slows_by = FAST, until >= NEVER, until
+
+    def run_from(self, at: Ns) -> None:
+        """The current rises to its run value; what it falls to behind is counted from `at` on."""
+        self.last, self._held = at, not self.drive.currents.after
 
     def _running(self) -> float:
         if not self.on:

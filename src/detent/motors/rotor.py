@@ -12,6 +12,7 @@ from detent.motors.drive import Drive
 from detent.motors.excitation import Changes, Sequencer
 from detent.motors.load import NO_LOAD, Load
 from detent.motors.motor import Motor, MotorError, Shared
+from detent.motors.winding import Winding
 from detent.ticks import US, Ns
 
 SUBSTEP: Ns = 20 * US
@@ -28,6 +29,7 @@ class Rig(Shared):
     drive: Drive
     load: Load = NO_LOAD
     substep: Ns = SUBSTEP
+    sequences: tuple[Winding, ...] = ()  # that can be commanded, all on one grid, which is that of the drive's
     parameters: Floats = field(init=False)
     table_a: Floats = field(init=False)
     table_b: Floats = field(init=False)
@@ -63,8 +65,8 @@ class Rig(Shared):
         if load.is_steady:
             par[kernel.TL] = load.at_rest()
         set_(self, "parameters", par)
-        set_(self, "table_a", np.array([winding.a]))
-        set_(self, "table_b", np.array([winding.b]))
+        set_(self, "table_a", np.array([table.a for table in self.sequences or (winding,)]))
+        set_(self, "table_b", np.array([table.b for table in self.sequences or (winding,)]))
         set_(self, "by_time", np.array(load.torque_by_time.values))
         set_(self, "by_position", np.array(load.torque_by_position.values))
 

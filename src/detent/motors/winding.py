@@ -110,3 +110,14 @@ CONTROLLERS: dict[str, tuple[Winding, ...]] = {
     "bs0710": tuple(genstepper(mode) for mode in range(4)),
 }
 """What each controller, or the drive it is sold with, can do to the windings; the last is its finest."""
+
+GRID = 64
+"""Places in a full step of the sequences that can be commanded."""
+_BOARD = CONTROLLERS["bs0610"]
+_DCB_274 = (microstep(8, amplitude=1.0), microstep(4, amplitude=1.0), HALF, FULL, microstep(2, amplitude=1.0), WAVE)
+COMMANDED: dict[str, tuple[Winding, ...]] = {
+    "dcb-274": tuple(table.on_grid(GRID) for table in _DCB_274),  # by H
+    "bs0610": _BOARD,  # by O
+    "bs0710": _BOARD,
+}
+"""The sequences of the controllers that command their power stage, by the number in their command."""

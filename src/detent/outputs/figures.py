@@ -114,7 +114,7 @@ def timeline_figure(
 
 
 def chosen_lanes(signals: Signals) -> list[Pin | Strip]:
-    """Strips for programs that were executed and for windings; then pins that change, no step clocks or serial wires."""
+    """Strips for executed programs and for windings; then pins that change, but no step clocks and serial wires."""
     strips: list[Pin | Strip] = []
     for unit in signals.units:
         bands = curves.instructions(signals, unit.name)

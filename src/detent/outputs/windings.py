@@ -13,9 +13,9 @@ import numpy as np
 from detent.cell.recording import Recording
 from detent.controllers.device import DriveSet, Powered
 from detent.outputs.waves import BEFORE_ALL, Wave
-from detent.pulses import Ticked, Train
+from detent.pulses.rates import rates_at
 from detent.pulses.segment import Int64Array
-from detent.ticks import FIXED_BITS, Ns, to_fixed
+from detent.ticks import Ns
 
 if TYPE_CHECKING:
     from detent.outputs.signals import UnitSignals
@@ -131,7 +131,7 @@ class Driven:
             at = span.train.times(first, last)
             places = span.shaft + span.direction * np.arange(first, last + 1, dtype=np.int64)
             times.append(at)
-            counts.append(self._counts_at(at, places, _rates(span.train, at)))
+            counts.append(self._counts_at(at, places, rates_at(span.train, at)))
         stepped = np.concatenate(times)
         # what is set, and what begins, in the instant of a step counts in that instant
         marks = (marks[slice(*np.searchsorted(marks, (begin, end)))] for marks in (self._since, self._begins))
@@ -166,25 +166,3 @@ def _settings(recording: Recording, unit: str, connector: str) -> list[Setting]:
         if (isinstance(entry, DriveSet) and entry.connector == connector)
         or (isinstance(entry, Powered) and not entry.on)
     ]
-
-
-def _rates(train: Train, times: Int64Array) -> Int64Array:
-    """The whole steps/s of a train at times that are in order; 0 in gaps and from its end on."""
-    rates = np.zeros(len(times), np.int64)
-    for segment in train.segments:
-        low = int(np.searchsorted(times, _from(train.start + segment.begin)))
-        high = len(times) if segment.end is None else int(np.searchsorted(times, _from(train.start + segment.end)))
-        inside = times[low:high]
-        if not len(inside):
-            continue
-        if isinstance(segment, Ticked):
-            rates[low:high] = segment.rates_by(inside, train.start)
-        else:
-            found = (int(segment.progress(to_fixed(t) - train.start)[1]) for t in inside.tolist())
-            rates[low:high] = np.fromiter(found, np.int64, len(inside))
-    return rates
-
-
-def _from(instant: int) -> Ns:
-    """The first whole ns that is not before an instant."""
-    return -(-instant >> FIXED_BITS)

@@ -9,12 +9,14 @@ from typing import Final, NamedTuple
 from detent.controllers.dcb274 import settings
 from detent.controllers.dcb274.motion import SETTLING, Motion
 from detent.controllers.dcb274.settings import Settings
+from detent.controllers.device import Stage
 from detent.ramps.timer_table import TICK
 from detent.ticks import NEVER, SECOND, Ns
 
 FULL_CURRENT: Final = 4.0  # amperes a phase at 100 (page 52)
 _DECAY_UNIT: Final = 12  # full steps/s for each unit of b (within 8 % of the table on page 36)
 _ALWAYS_SLOW: Final = 255
+_GRID: Final = 64  # places in a full step, of `Stage`
 
 
 class Phases(NamedTuple):
@@ -89,3 +91,14 @@ def drive(motion: Motion, registers: Settings, shaft: int, now: Ns) -> Drive:
     table = TABLES[registers.resolution]
     step = (shaft - motion.phase_origin) % len(table)
     return Drive(percent(motion, registers, now), slow_decay(motion, registers, now), table, step)
+
+
+def stage(registers: Settings) -> Stage:
+    """The same as Y, b and H command it, whatever the motion: sequences are the values of H."""
+    hold, run = registers.current
+    steps = settings.RESOLUTION[registers.resolution]
+    limit = threshold(registers.decay, registers.resolution)
+    over = 0 if registers.decay == _ALWAYS_SLOW else SECOND // limit if limit else NEVER - 1
+    both = TABLES[registers.resolution] is _FULL  # its first entry lies half a step on
+    return Stage(registers.resolution, _GRID // steps, _GRID // 2 if both else 0, FULL_CURRENT * run / 100,
+                 FULL_CURRENT * hold / 100, SETTLING, True, over)  # fmt: skip

@@ -33,7 +33,7 @@ from detent.controllers.dcb274.running import Running
 from detent.controllers.dcb274.settings import Settings
 from detent.controllers.dcb274.trip import Trip
 from detent.controllers.dcb274.work import Work, position
-from detent.controllers.device import Output, Powered, Status, StoreImage
+from detent.controllers.device import Output, Powered, StageSet, Status, StoreImage
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PulseOutput
 from detent.ticks import NEVER, Ns
 from detent.uart import Char, Format, SerialPort, Transmitter
@@ -75,6 +75,7 @@ class Dcb274:
         self._set_inputs: set[str] = set()  # that something drives: the others follow the PLC jumper
         self._base = 0  # of the program that was loaded
         self._powered = False
+        self._staged: tuple[int, int, tuple[int, int], int] | None = None  # what was last told of the power stage
         self._quiet = False  # nothing is under way: characters for others need no more than a look
         self._inbox: deque[int] = deque()  # characters that wait until a command has executed
         self._entry: Entry = SingleEntry()
@@ -110,6 +111,7 @@ class Dcb274:
                 self._ports.levels[pin] = LOW if self._straps["PLC"] == HIGH else HIGH
             self._reset(now, party=False)
             return
+        self._staged = None
         if self._axis.moving:
             self._axis.cut(now)
         self._motion.reset()
@@ -460,6 +462,11 @@ class Dcb274:
             self._desk.poll(now)
         self._test_inputs(now)
         self._read_out(now)
+        registers, origin = self._settings, self._motion.phase_origin
+        staged = origin, registers.resolution, registers.current, registers.decay
+        if staged != self._staged:
+            self._staged = staged
+            self._out.append(StageSet(now, "", origin, current.stage(registers)))
 
     def _test_inputs(self, now: Ns) -> None:
         """Jog and go, in the idle state: no command begun or in hand, no program (page 27)."""

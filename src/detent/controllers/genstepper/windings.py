@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from detent.controllers.device import Stage
 from detent.pulses.segment import Int64Array
 
 FULL = 256  # PWM counts of full current
@@ -104,6 +105,13 @@ class Drive(NamedTuple):
     def power(self) -> str:
         """The part of the full power; below the auto full step rate, where there is one."""
         return POWERS.get(self.sixteenths, f"{self.sixteenths}/16")
+
+    @property
+    def stage(self) -> Stage:
+        """Sequences are the values of O; a rate / 256 greater than `auto` is one of (`auto` + 1) x 256 or more."""
+        fast = (self.auto + 1) * 256 if self.auto >= 0 else None
+        power = self.sixteenths / 16
+        return Stage(self.mode, self.size, run=power, hold=power, fast_from=fast, fast_sequence=self.auto_mode)
 
     def duties(self, position: int, rate: int) -> Duties:
         """The PWM counts at a position, in microsteps, and a rate, in microsteps/s."""
