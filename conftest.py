@@ -21,6 +21,7 @@ from typing import Any
 from unittest import SkipTest
 
 import pytest
+from hypothesis import settings as hypothesis_settings
 from sybil import Document, Example, Region, Sybil
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
 
@@ -30,6 +31,10 @@ ROOT = Path(__file__).parent
 PLAIN = re.compile(r"[^|&;<>$`*?~]+")  # a command that needs no shell
 FILE = re.compile(r"<!-- file: (?P<name>\S+) -->\n+```\w*\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 BIN = Path(sys.executable).parent
+
+# Generated cases are the same in every run: a test passes every time, or fails every time.
+hypothesis_settings.register_profile("repeatable", derandomize=True, deadline=None)
+hypothesis_settings.load_profile("repeatable")
 
 
 def python(document: Document) -> Iterable[Region]:

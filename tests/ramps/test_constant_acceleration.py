@@ -158,3 +158,8 @@ def test_moves_of_one_kind_are_planned_once():
 def test_a_move_that_makes_no_sense_is_refused(wrong):
     with pytest.raises(ValueError, match="a move has"):
         move(*wrong)
+
+
+def test_a_ramp_that_ends_half_way_between_two_nanoseconds_ends_at_the_later() -> None:
+    # 43 steps from 2080 to 8160 steps/s take 86 / 10 240 s = 8 398 437.5 ns, exactly
+    assert move(2080, 8160, 43, None).train.time_of(43) == 8_398_438
