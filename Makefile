@@ -8,7 +8,7 @@ SHELL := /bin/bash
 UV := $(shell command -v uv || echo .uv/bin/uv)
 PYTHON := .venv/bin/python
 STAMP := .venv/.installed
-SYSTEM_PACKAGES := sigrok-cli
+SYSTEM_PACKAGES := sigrok-cli chromium
 
 .PHONY: setup system run test test-all check bench lock docs clean
 

@@ -1,5 +1,7 @@
 """A line of a cell as a host driver's port: bytes written and read, and waiting, in the cell's virtual time."""
 
+from contextlib import AbstractContextManager, nullcontext
+
 from detent.cell.cell import Cell
 from detent.ticks import SECOND, Ns
 
@@ -31,6 +33,37 @@ class HostPort:
         data = bytes(self._heard[:count])
         del self._heard[:count]
         return data
+
+    def receive(self, timeout: float) -> bytes:
+        """What has reached the host, as soon as that is something, within `timeout` seconds behind what is sent."""
+        line = self.cell.lines[self.line]
+        until = max(self.cell.now, line.host_busy_until) + round(timeout * SECOND)
+        while True:
+            self._heard += bytes(heard.char.value for heard in line.take())
+            at = self.cell.next_event()
+            if self._heard or at is None or at > until:
+                break
+            self.cell.step()
+        if not self._heard:
+            self.cell.run_to(until)
+        data = bytes(self._heard)
+        self._heard.clear()
+        return data
+
+    def keep(self, data: bytes) -> None:
+        """`data` comes first at the next `receive`."""
+        self._heard[:0] = data
+
+    def clock(self) -> float:
+        """Seconds of the cell."""
+        return self.cell.now / SECOND
+
+    def turn(self) -> AbstractContextManager[object]:
+        """Nobody else is there."""
+        return nullcontext()
+
+    def close(self) -> None:
+        """Nothing is held."""
 
     def wait(self, seconds: float) -> None:
         """Let so many seconds pass, from the end of what is being sent."""

@@ -13,10 +13,11 @@ import os
 import select
 import signal
 import threading
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 from detent.lines.line import Heard
 from detent.realtime.endpoints.endpoint import Endpoint
@@ -26,6 +27,8 @@ from detent.ticks import MS, SECOND, US, Ns
 EARLY: WallNs = 60 * US  # sleeping is given up so long before a deadline: no system wakes a sleeper to the microsecond
 LONGEST: WallNs = 2 * MS  # a cell that cannot keep pace lets the clients have a word so often
 BEHIND = 64  # characters waiting on a line before its clients have to wait
+
+T = TypeVar("T")
 
 Wait: TypeAlias = Callable[
     [Sequence[int], Sequence[int], Sequence[int], float | None], tuple[list[int], list[int], list[int]]
@@ -86,6 +89,8 @@ class Loop:
             self._of_line[line].append(endpoint)
         self._patience = list(patience) if patience is not None else [0] * len(cell.lines)
         self._stopping = False
+        self._closed = False
+        self._asked: deque[tuple[Callable[[], Any], Future[Any]]] = deque()  # of other threads
         self._woken, self._waker = os.pipe()
         os.set_blocking(self._woken, False)
         os.set_blocking(self._waker, False)
@@ -98,11 +103,43 @@ class Loop:
     def stop(self) -> None:
         """End `run` soon. May be called from signal handlers and other threads."""
         self._stopping = True
+        self._wake()
+
+    def ask(self, function: Callable[[], T]) -> "Future[T]":
+        """Call `function` soon on the thread that serves, when the cell is at its present; from any thread.
+
+        What it returns or raises is in the future. A loop that ends cancels what it has not begun.
+        """
+        future: Future[T] = Future()
+        self._asked.append((function, future))
+        if self._closed:
+            self._cancel()
+        else:
+            self._wake()
+        return future
+
+    def _wake(self) -> None:
         with contextlib.suppress(BlockingIOError):  # full of earlier calls: it wakes all the same
             os.write(self._waker, b"\0")
 
+    def _do_asked(self) -> None:
+        for _ in range(len(self._asked)):
+            function, future = self._asked.popleft()
+            if not future.set_running_or_notify_cancel():
+                continue
+            try:
+                future.set_result(function())
+            except Exception as error:  # whoever asked is told
+                future.set_exception(error)
+
+    def _cancel(self) -> None:
+        while self._asked:
+            self._asked.popleft()[1].cancel()
+
     def close(self) -> None:
         """Let go of what the loop holds itself; the endpoints are their owner's."""
+        self._closed = True
+        self._cancel()
         os.close(self._woken)
         os.close(self._waker)
 
@@ -126,6 +163,7 @@ class Loop:
             reader = readers[descriptor]
             if reader is None:
                 os.read(self._woken, 64)
+                self._do_asked()
                 continue
             line, endpoint = reader
             data = endpoint.receive(descriptor, wall)
@@ -142,7 +180,9 @@ class Loop:
     def _timeout(self) -> float | None:
         """Seconds to sleep at most; None if only a client can start anything."""
         at = self._cell.next_event()
-        due = None if at is None else self._pace.due(at) - EARLY
+        due = None if at is None else self._pace.due(at)
+        if due is not None:
+            due -= EARLY
         for _, endpoint in self._endpoints:
             other = endpoint.deadline()
             if other is not None and (due is None or other < due):
@@ -160,10 +200,11 @@ class Loop:
         while (at := cell.next_event()) is not None and at <= present:
             cell.run_to(at)
             wall = pace.clock()
-            pace.lateness.note(wall - pace.due(at))
+            if not pace.free:
+                pace.lateness.note(wall - (pace.due(at) or wall))
             if wall - began > LONGEST:
                 return  # clients wait; the cell goes on where it was, and its lateness shows it
-        if present > cell.now:
+        if present > cell.now and not pace.free:
             cell.run_to(present)
 
     def _tell(self, wall: WallNs) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
-from detent.ticks import Ns
+from detent.ticks import NEVER, Ns
 
 WallNs: TypeAlias = int
 Clock: TypeAlias = Callable[[], WallNs]
@@ -20,30 +20,65 @@ _LARGEST = 1 << 40  # 18 minutes; later than that is counted as that, `most` sti
 
 
 class Pace:
-    """Cell time runs `factor` times as fast as the clock, from `origin` at the moment this is made."""
+    """Cell time runs `factor` times as fast as the clock, from `origin` at the moment this is made.
+
+    It can be `held`: then the cell time stands. It can be `free`: then a cell does what it has to do as fast as it
+    can, and its time stands while it has nothing to do. `factor` is the one that counts when it is neither.
+    """
 
     def __init__(self, factor: Fraction | float = 1, *, origin: Ns = 0, clock: Clock = time.monotonic_ns) -> None:
         if not 0 < factor < math.inf:
             raise ValueError(f"pace {factor} would not go forward; it takes a number above 0")
-        # the decimal that was written, not its binary neighbour: 0.1 is one tenth
-        exact = factor if isinstance(factor, Fraction) else Fraction(repr(factor))
         self.clock = clock
-        self.factor = exact
+        self.held = False
+        self.free = False
         self.lateness = Lateness()
-        self._multiply, self._divide = exact.numerator, exact.denominator
         self._origin = origin
         self._began: WallNs = clock()
+        self._set(factor)
+
+    def _set(self, factor: Fraction | float) -> None:
+        # the decimal that was written, not its binary neighbour: 0.1 is one tenth
+        self.factor = exact = factor if isinstance(factor, Fraction) else Fraction(repr(factor))
+        self._multiply, self._divide = exact.numerator, exact.denominator
 
     def restart(self, origin: Ns) -> None:
         """The cell time is `origin` now."""
         self._origin, self._began = origin, self.clock()
 
+    def hold(self, now: Ns) -> None:
+        """The cell time stands at `now` until `go`."""
+        self.held = True
+        self.restart(now)
+
+    def go(self, now: Ns) -> None:
+        """The cell time goes on from `now`."""
+        self.held = False
+        self.restart(now)
+
+    def change(self, factor: Fraction | float | None, now: Ns) -> None:
+        """From the cell time `now` on it runs at `factor`; None: free. Raises ValueError."""
+        if factor is not None:
+            if not 0 < factor < math.inf:
+                raise ValueError(f"pace {factor} would not go forward; it takes a number above 0")
+            self._set(factor)
+        self.free = factor is None
+        self.restart(now)
+
     def at(self, wall: WallNs) -> Ns:
-        """The cell time at `wall`."""
+        """The cell time at `wall`; without an end if it is free."""
+        if self.held:
+            return self._origin
+        if self.free:
+            return NEVER
         return self._origin + (wall - self._began) * self._multiply // self._divide
 
-    def due(self, at: Ns) -> WallNs:
-        """The first wall time at which the cell time is at least `at`."""
+    def due(self, at: Ns) -> WallNs | None:
+        """The first wall time at which the cell time is at least `at`; None: not before it is told to go on."""
+        if self.free:
+            return None if self.held else self._began
+        if self.held and at > self._origin:
+            return None
         return self._began - (self._origin - at) * self._divide // self._multiply
 
 

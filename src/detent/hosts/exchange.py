@@ -1,0 +1,352 @@
+"""Drivers without I/O: what a driver wants of its port is data, and two shells carry it out.
+
+A driver's method is a generator of `Step`s: it yields an `Ask`, is sent the `Answer`, and returns its result. It
+opens nothing, waits for nothing and reads no clock, so that a test can play the device with a list of answers. A
+method marked `@operation` is
+
+- on the plain driver: a generator, for other operations (``yield from self.position()``) and for tests;
+- on a subclass with `Blocking` before it: an ordinary call, ``unit.position()``;
+- on a subclass with `Asynchronous` before it: a coroutine, ``await unit.position()``.
+
+Type checkers see all three. The ports behind the shells are in `detent.realtime.ports`; `detent.cell.host` has one that
+lives in the virtual time of a cell.
+"""
+
+from collections.abc import Callable, Coroutine, Generator
+from contextlib import AbstractAsyncContextManager, AbstractContextManager, AsyncExitStack, ExitStack
+from functools import partial, update_wrapper
+from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeAlias, TypeVar, overload
+
+from detent.hosts.errors import NoAnswer, PortLost, Spoken
+
+T = TypeVar("T")
+P = ParamSpec("P")
+
+
+class Ask(NamedTuple):
+    """Send `data`, then read until `complete` says that an answer is there, for `timeout` seconds at most.
+
+    `complete` is given everything that has come and returns how many bytes of it are the answer, None while it is
+    not whole; what lies behind the answer is kept for the next one. Without `complete` nothing is read.
+    """
+
+    data: bytes
+    complete: Callable[[bytes], int | None] | None = None
+    timeout: float = 0.0
+
+
+class Pause(NamedTuple):
+    """Let so many seconds pass; the port stays ours. Time counts from when the last byte was handed over."""
+
+    seconds: float
+
+
+class Rest(NamedTuple):
+    """Let so many seconds pass; whoever else wants the port may have it meanwhile."""
+
+    seconds: float
+
+
+class Clear(NamedTuple):
+    """Forget what has come and was not read."""
+
+
+class Progress(NamedTuple):
+    """So much of a long operation is done: what, of how many. Costs nothing where nobody looks."""
+
+    done: int
+    total: int
+    what: str = ""
+
+
+class Answer(NamedTuple):
+    """What came: the answer to an `Ask`, or, if it is not `whole`, everything that came in its time."""
+
+    data: bytes = b""
+    whole: bool = True
+
+
+Step: TypeAlias = Ask | Pause | Rest | Clear | Progress
+Steps: TypeAlias = Generator[Step, Answer, T]
+
+NOTHING = Answer()
+
+
+def length(count: int) -> Callable[[bytes], int | None]:
+    """Complete once `count` bytes are there."""
+    return lambda data: count if len(data) >= count else None
+
+
+def until(end: bytes) -> Callable[[bytes], int | None]:
+    """Complete behind the first `end`."""
+
+    def complete(data: bytes) -> int | None:
+        place = data.find(end)
+        return None if place < 0 else place + len(end)
+
+    return complete
+
+
+class Driver:
+    """A host's side of one unit. `title` is what errors call it; `forget` drops what is known of a unit on a line."""
+
+    title: str = "unit"
+
+    def forget(self) -> None:
+        """The connection was lost: whatever was agreed on with the unit must be agreed on again."""
+
+    def ask(self, data: bytes, complete: Callable[[bytes], int | None], timeout: float) -> Steps[bytes]:
+        """The whole answer to `data`. Raises NoAnswer."""
+        answer = yield Ask(data, complete, timeout)
+        if not answer.whole:
+            what = "does not answer" if not answer.data else "does not finish its answer"
+            raise NoAnswer(self.title, f"{what} within {timeout:g} s", Spoken(data, answer.data))
+        return answer.data
+
+
+class Port(Protocol):
+    """What a `Blocking` driver needs of a serial port, a socket, or the line of a cell."""
+
+    def write(self, data: bytes, /) -> object:
+        """Hand over all of `data`. Raises OSError if the port is gone; the next call opens it again."""
+
+    def receive(self, timeout: float, /) -> bytes:
+        """What has come, as soon as that is something; nothing if nothing comes within `timeout` seconds."""
+
+    def keep(self, data: bytes, /) -> object:
+        """`data` was read too early: it comes first at the next `receive`."""
+
+    def wait(self, seconds: float, /) -> object:
+        """Let so many seconds pass, from when the last byte written is on its way."""
+
+    def clock(self) -> float:
+        """Seconds since whenever, never fewer than before."""
+
+    def turn(self) -> AbstractContextManager[object]:
+        """The port is one operation's alone while this lasts."""
+
+    def close(self) -> object:
+        """Let go of it."""
+
+
+class AsyncPort(Protocol):
+    """The same for an `Asynchronous` driver."""
+
+    async def write(self, data: bytes, /) -> object:
+        """Hand over all of `data`. Raises OSError if the port is gone; the next call opens it again."""
+
+    async def receive(self, timeout: float, /) -> bytes:
+        """What has come, as soon as that is something; nothing if nothing comes within `timeout` seconds."""
+
+    def keep(self, data: bytes, /) -> object:
+        """`data` was read too early: it comes first at the next `receive`."""
+
+    async def wait(self, seconds: float, /) -> object:
+        """Let so many seconds pass, from when the last byte written is on its way."""
+
+    def clock(self) -> float:
+        """Seconds since whenever, never fewer than before."""
+
+    def turn(self) -> AbstractAsyncContextManager[object]:
+        """The port is one operation's alone while this lasts."""
+
+    async def close(self) -> object:
+        """Let go of it."""
+
+
+Watch: TypeAlias = Callable[[Progress], object]
+"""Is told how far a long operation is."""
+
+
+class _Shell:
+    """What both shells have: the plain driver and who watches. Whatever is no operation is the driver's."""
+
+    def __init__(self, driver: Driver, watch: Watch | None = None) -> None:
+        self.driver, self.watch = driver, watch
+
+    def __getattr__(self, name: str) -> Any:  # called only for what is neither the shell's nor an operation
+        if name == "driver":
+            raise AttributeError(name)
+        return getattr(self.driver, name)
+
+    def _lost(self, error: OSError) -> PortLost:
+        self.driver.forget()
+        return PortLost(self.driver.title, f"the port is gone: {error.strerror or error}")
+
+
+class Blocking(_Shell):
+    """Operations are calls that return when they are done.
+
+    ``class BlockingGsC200(Blocking, GsC200)`` gives a driver this shell. Several drivers may share a port.
+    """
+
+    def __init__(self, driver: Driver, port: Port, watch: Watch | None = None) -> None:
+        super().__init__(driver, watch)
+        self.port = port
+
+    def perform(self, steps: Steps[T]) -> T:
+        """Carry out the steps of an operation of the plain driver; its result. Raises DriverError."""
+        answer: Answer | None = None
+        with ExitStack() as turn:
+            mine = False
+            while True:
+                try:
+                    step = next(steps) if answer is None else steps.send(answer)
+                except StopIteration as end:
+                    return end.value  # type: ignore[no-any-return]
+                if isinstance(step, Rest):
+                    turn.close()
+                    mine = False
+                elif not mine:
+                    turn.enter_context(self.port.turn())
+                    mine = True
+                try:
+                    answer = self._do(step)
+                except OSError as error:
+                    raise self._lost(error) from error
+
+    def _do(self, step: Step) -> Answer:
+        match step:
+            case Ask(data, complete, timeout):
+                if data:
+                    self.port.write(data)
+                return NOTHING if complete is None else self._read(complete, timeout)
+            case Pause(seconds) | Rest(seconds):
+                self.port.wait(seconds)
+            case Clear():
+                while self.port.receive(0.0):
+                    pass
+            case Progress():
+                if self.watch is not None:
+                    self.watch(step)
+        return NOTHING
+
+    def _read(self, complete: Callable[[bytes], int | None], timeout: float) -> Answer:
+        port, came = self.port, b""
+        end = port.clock() + timeout
+        while (left := end - port.clock()) >= 0:
+            more = port.receive(left)
+            if not more:
+                break
+            came += more
+            count = complete(came)
+            if count is not None:
+                port.keep(came[count:])
+                return Answer(came[:count])
+        return Answer(came, whole=False)
+
+    def close(self) -> None:
+        """Close the port, for all who share it."""
+        self.port.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class Asynchronous(_Shell):
+    """Operations are coroutines. ``class AsyncGsC200(Asynchronous, GsC200)`` gives a driver this shell."""
+
+    def __init__(self, driver: Driver, port: AsyncPort, watch: Watch | None = None) -> None:
+        super().__init__(driver, watch)
+        self.port = port
+
+    async def perform(self, steps: Steps[T]) -> T:
+        """Carry out the steps of an operation of the plain driver; its result. Raises DriverError."""
+        answer: Answer | None = None
+        async with AsyncExitStack() as turn:
+            mine = False
+            while True:
+                try:
+                    step = next(steps) if answer is None else steps.send(answer)
+                except StopIteration as end:
+                    return end.value  # type: ignore[no-any-return]
+                if isinstance(step, Rest):
+                    await turn.aclose()
+                    mine = False
+                elif not mine:
+                    await turn.enter_async_context(self.port.turn())
+                    mine = True
+                try:
+                    answer = await self._do(step)
+                except OSError as error:
+                    raise self._lost(error) from error
+
+    async def _do(self, step: Step) -> Answer:
+        match step:
+            case Ask(data, complete, timeout):
+                if data:
+                    await self.port.write(data)
+                return NOTHING if complete is None else await self._read(complete, timeout)
+            case Pause(seconds) | Rest(seconds):
+                await self.port.wait(seconds)
+            case Clear():
+                while await self.port.receive(0.0):
+                    pass
+            case Progress():
+                if self.watch is not None:
+                    self.watch(step)
+        return NOTHING
+
+    async def _read(self, complete: Callable[[bytes], int | None], timeout: float) -> Answer:
+        port, came = self.port, b""
+        end = port.clock() + timeout
+        while (left := end - port.clock()) >= 0:
+            more = await port.receive(left)
+            if not more:
+                break
+            came += more
+            count = complete(came)
+            if count is not None:
+                port.keep(came[count:])
+                return Answer(came[:count])
+        return Answer(came, whole=False)
+
+    async def close(self) -> None:
+        """Close the port, for all who share it."""
+        await self.port.close()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+
+class Operation(Generic[P, T]):
+    """A method of a driver, seen as its owner's shell needs it: see `operation`."""
+
+    def __init__(self, method: Callable[Concatenate[Any, P], Steps[T]]) -> None:
+        self._method = method
+        update_wrapper(self, method)  # type: ignore[arg-type]
+
+    @overload
+    def __get__(self, unit: None, owner: type[Any]) -> Self: ...
+    @overload
+    def __get__(self, unit: Blocking, owner: type[Any]) -> Callable[P, T]: ...
+    @overload
+    def __get__(self, unit: Asynchronous, owner: type[Any]) -> Callable[P, Coroutine[Any, Any, T]]: ...
+    @overload
+    def __get__(self, unit: Driver, owner: type[Any]) -> Callable[P, Steps[T]]: ...
+    def __get__(self, unit: Any, owner: type[Any]) -> Any:
+        """The method as a call, a coroutine function or a generator function."""
+        if unit is None:
+            return self
+        if not isinstance(unit, _Shell):
+            return partial(self._method, unit)
+        method = self._method
+
+        def call(*given: P.args, **named: P.kwargs) -> Any:
+            return unit.perform(method(unit.driver, *given, **named))
+
+        return update_wrapper(call, method)
+
+
+def operation(method: Callable[Concatenate[Any, P], Steps[T]]) -> Operation[P, T]:
+    """Make a generator of steps the method of a driver that both shells understand.
+
+    Arguments are checked when the first step is asked for: on a shell, at the call.
+    """
+    return Operation(method)
