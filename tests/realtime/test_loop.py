@@ -1,10 +1,11 @@
 import select
+import threading
 import tracemalloc
 from collections.abc import Sequence
 from fractions import Fraction
 
 import pytest
-from tests.realtime.ticking import LOOK, Client, TickingCell, Wall
+from tests.realtime.ticking import LOOK, Client, TickingCell, Wall, look
 
 from detent.realtime.loop import LONGEST, Loop
 from detent.realtime.pace import Pace
@@ -180,3 +181,62 @@ def test_stopping_again_and_again_does_no_harm() -> None:
         loop.stop()
     loop.run()
     loop.close()
+
+
+def test_a_held_cell_does_nothing_and_sleeps_until_somebody_says_something() -> None:
+    wall, cell, client = Ready(), TickingCell(MS), Client()
+    pace = Pace(clock=wall)
+    loop = Loop(cell, pace, [(0, client)], wait=wall.wait)
+    pace.hold(0)
+    wall.now += SECOND
+    loop.step()
+    assert (cell.now, cell.ticks, wall.asked) == (0, 0, [None])
+    pace.go(cell.now)
+    wall.now += 3 * MS
+    loop.step()
+    loop.close()
+    assert (cell.now, cell.ticks) == (3 * MS, 3)
+
+
+def test_a_free_cell_does_what_it_can_in_the_time_that_clients_may_wait() -> None:
+    class Working(Ready):
+        def __call__(self) -> int:
+            self.now += US
+            return self.now
+
+    wall, cell, client = Working(), TickingCell(SECOND), Client()
+    pace = Pace(clock=wall)
+    pace.change(None, 0)
+    loop = Loop(cell, pace, [(0, client)], wait=wall.wait)
+    loop.step()
+    loop.close()
+    assert wall.asked == [0.0]
+    assert cell.ticks == LONGEST // US + 1  # the one that is over the time is the last
+    assert cell.now == cell.ticks * SECOND
+    assert pace.lateness.count == 0  # nothing was due at any time
+
+
+def test_a_free_cell_without_anything_to_do_keeps_its_time() -> None:
+    wall, cell = Ready(), TickingCell(None)
+    pace = Pace(clock=wall)
+    pace.change(None, 0)
+    loop = Loop(cell, pace, [(0, Client())], wait=wall.wait)
+    loop.step()
+    loop.close()
+    assert (cell.now, wall.asked) == (0, [None])
+
+
+def test_other_threads_are_served_between_two_waits_and_hear_what_came_of_it() -> None:
+    cell = TickingCell(None)
+    loop = Loop(cell, Pace(), [], wait=look)
+    serving = threading.Thread(target=loop.run)
+    serving.start()
+    assert loop.ask(threading.current_thread).result(20) is serving
+    with pytest.raises(KeyError):
+        loop.ask(lambda: {}["no"]).result(20)
+    loop.stop()
+    serving.join()
+    late = loop.ask(lambda: 1)
+    loop.close()
+    assert late.cancelled()
+    assert loop.ask(lambda: 1).cancelled()

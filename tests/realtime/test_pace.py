@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from tests.realtime.ticking import Wall
 
 from detent.realtime.pace import Lateness, Pace
+from detent.ticks import NEVER
 
 HOUR = 3_600_000_000_000
 
@@ -14,6 +15,7 @@ HOUR = 3_600_000_000_000
 def test_due_is_the_first_instant_at_which_the_cell_has_come_so_far(factor: Fraction, at: int, origin: int) -> None:
     pace = Pace(factor, origin=origin, clock=Wall())
     due = pace.due(origin + at)
+    assert due is not None
     assert pace.at(due) >= origin + at
     assert pace.at(due - 1) < origin + at
 
@@ -41,6 +43,41 @@ def test_a_restarted_clock_forgets_the_time_before() -> None:
     pace.restart(1_000)
     assert pace.at(wall.now) == 1_000
     assert pace.at(wall.now + 5) == 1_010
+
+
+def test_a_held_clock_stands_and_goes_on_where_it_stood() -> None:
+    wall = Wall()
+    pace = Pace(2, clock=wall)
+    wall.now += 100
+    pace.hold(200)
+    wall.now += HOUR
+    assert pace.at(wall.now) == 200
+    assert pace.due(200) == wall.now - HOUR
+    assert pace.due(201) is None
+    pace.go(200)
+    assert pace.at(wall.now + 7) == 214
+
+
+def test_a_free_clock_lets_everything_be_due_and_goes_back_to_a_pace() -> None:
+    wall = Wall()
+    pace = Pace(3, clock=wall)
+    pace.change(None, 50)
+    assert pace.at(wall.now) == NEVER
+    assert pace.due(10**18) == wall.now
+    pace.hold(60)
+    assert (pace.at(wall.now), pace.due(70)) == (60, None)
+    pace.go(60)
+    pace.change(0.5, 80)
+    assert not pace.free
+    assert pace.at(wall.now + 10) == 85
+
+
+def test_a_pace_that_would_not_go_forward_changes_nothing() -> None:
+    pace = Pace(3, clock=Wall())
+    with pytest.raises(ValueError, match="would not go forward"):
+        pace.change(0, 5)
+    assert pace.factor == 3
+    assert pace.at(pace.clock()) == 0
 
 
 @given(st.lists(st.integers(0, 1 << 45), min_size=1, max_size=200), st.integers(1, 100))
