@@ -6,19 +6,17 @@
 Steps are half steps. The left arm has the drives 1 to 3 and the wrist 4, the right arm 5 to 7.
 """
 
-import socket
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
-from detent.hosts.ccu import Ccu
+from detent.hosts.supersigma import BlockingCcu, Ccu
 
 LEFT_X, LEFT_Y, LEFT_Z, WRIST, RIGHT_X, RIGHT_Y, RIGHT_Z = DRIVES = range(1, 8)
 GRIP = 0.25  # seconds that a hand takes to close or to open; hands are the matter of another card
 
 
-def pick_and_place(ccu: Ccu, wait: Callable[[float], object]) -> None:
+def pick_and_place(ccu: BlockingCcu, wait: Callable[[float], object]) -> None:
     """The whole assembly, from unknown places to the arms at rest."""
     # The Z axes first, so that no arm hits anything; then all that is left, together.
     ccu.originate_all([LEFT_Z, RIGHT_Z])
@@ -59,7 +57,7 @@ def in_virtual_time(figure: Path | None) -> None:
     description = parse(file.read_text(), str(file))
     cell = build(description, lambda name: file.with_name(name).read_text())
     port = HostPort(cell)
-    pick_and_place(Ccu(port, port.wait), port.wait)
+    pick_and_place(BlockingCcu(Ccu(), port), port.wait)
     for name, drive in cell.controllers().items():
         status = drive.status(cell.now)
         print(f"{name:10} at {status.position:+6}, {status.pulses:6} half steps made")
@@ -70,31 +68,22 @@ def in_virtual_time(figure: Path | None) -> None:
         print(f"Wrote {figure}")
 
 
-class Connection:
-    """A port for the driver on a TCP connection."""
+def on_drives(address: str) -> None:
+    """Run on drives that are served, or on real ones."""
+    from detent.realtime.ports import open_port
 
-    def __init__(self, host: str, port: int) -> None:
-        self._socket = socket.create_connection((host, port), timeout=5)
-
-    def write(self, data: bytes) -> None:
-        """Send `data`."""
-        self._socket.sendall(data)
-
-    def read(self, count: int) -> bytes:
-        """The next `count` bytes."""
-        data = b""
-        while len(data) < count and (more := self._socket.recv(count - len(data))):
-            data += more
-        return data
+    port = open_port(address)
+    pick_and_place(BlockingCcu(Ccu(), port), port.wait)
+    port.close()
 
 
 def main() -> None:
     """Choose by the argument."""
-    host, colon, port = (sys.argv[1] if len(sys.argv) > 1 else "").rpartition(":")
-    if colon:
-        pick_and_place(Ccu(Connection(host, int(port)), time.sleep), time.sleep)
+    argument = sys.argv[1] if len(sys.argv) > 1 else ""
+    if ":" in argument:
+        on_drives(argument)
     else:
-        in_virtual_time(Path(port) if port else None)
+        in_virtual_time(Path(argument) if argument else None)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import parse
 from detent.cell.host import HostPort
-from detent.hosts.ccu import Ccu
+from detent.hosts.supersigma import BlockingCcu, Ccu
 from detent.outputs.signals import UnitSignals, of_cell
 from detent.ticks import MS, SECOND, Ns
 
@@ -146,7 +146,7 @@ def assembled() -> Cell:
     cell = example("assembly")
     port = HostPort(cell)
     script = runpy.run_path(str(EXAMPLES / "assembly" / "pick_and_place.py"))
-    script["pick_and_place"](Ccu(port, port.wait), port.wait)
+    script["pick_and_place"](BlockingCcu(Ccu(), port), port.wait)
     return cell
 
 
@@ -154,7 +154,7 @@ class TestAssembly:
     def test_the_seven_drives_of_the_robot_find_their_origins_and_come_home_again(self, assembled: Cell) -> None:
         assert len(positions(assembled)) == 7
         assert set(positions(assembled).values()) == {0}
-        ccu = Ccu(HostPort(assembled), float)
+        ccu = BlockingCcu(Ccu(), HostPort(assembled))
         assert all(ccu.status(drive).flags == 8 for drive in range(1, 8))  # originated, and nothing else
 
     def test_the_bearing_goes_on_a_straight_line_beside_which_no_axis_is_by_a_step(self, assembled: Cell) -> None:

@@ -19,6 +19,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from detent.hosts.errors import PortLost
 from detent.hosts.exchange import NOTHING, Answer, Ask, Clear, Pause, Progress, Rest, Step
 
 
@@ -88,14 +89,19 @@ class Player:
         result, error = None, None
         try:
             steps = eval(f"unit.{text}", {**self.names, "unit": self.unit})
-            answer = NOTHING
+            step = next(steps)
             while True:
-                step = next(steps) if answer is NOTHING else steps.send(answer)
-                answer = self.do(step)
+                try:
+                    answer = self.do(step)
+                except ConnectionError:
+                    self.unit.forget()
+                    step = steps.throw(PortLost("unit", "the port is gone"))
+                else:
+                    step = steps.send(answer)
         except StopIteration as end:
             result = end.value
-        except ConnectionError:
-            self.unit.forget()
+        except PortLost:
+            pass
         except (RuntimeError, ValueError) as raised:
             error = raised
         self.check(not self.sending, f"{self.sending!r} was not sent")

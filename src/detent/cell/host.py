@@ -3,36 +3,20 @@
 from contextlib import AbstractContextManager, nullcontext
 
 from detent.cell.cell import Cell
-from detent.ticks import SECOND, Ns
-
-PATIENCE: Ns = 1 * SECOND  # how long `read` waits for an answer
+from detent.ticks import SECOND
 
 
 class HostPort:
     """The host's end of line number `line` of `cell`. `wait` lets virtual time pass."""
 
-    def __init__(self, cell: Cell, line: int = 0, *, patience: Ns = PATIENCE) -> None:
-        self.cell, self.line, self.patience = cell, line, patience
+    def __init__(self, cell: Cell, line: int = 0) -> None:
+        self.cell, self.line = cell, line
         self._heard = bytearray()
 
     def write(self, data: bytes) -> int:
         """Send `data` behind what is still being sent."""
         self.cell.send(self.line, data)
         return len(data)
-
-    def read(self, count: int) -> bytes:
-        """The next `count` bytes, or those that come while the patience lasts. Time passes until they are there."""
-        line = self.cell.lines[self.line]
-        until = max(self.cell.now, line.host_busy_until) + self.patience
-        while True:
-            self._heard += bytes(heard.char.value for heard in line.take())
-            at = self.cell.next_event()
-            if len(self._heard) >= count or at is None or at > until:
-                break
-            self.cell.step()
-        data = bytes(self._heard[:count])
-        del self._heard[:count]
-        return data
 
     def receive(self, timeout: float) -> bytes:
         """What has reached the host, as soon as that is something, within `timeout` seconds behind what is sent."""

@@ -13,7 +13,7 @@ lives in the virtual time of a cell.
 """
 
 from collections.abc import Callable, Coroutine, Generator
-from contextlib import AbstractAsyncContextManager, AbstractContextManager, AsyncExitStack, ExitStack
+from contextlib import AbstractAsyncContextManager, AbstractContextManager, AsyncExitStack, ExitStack, closing
 from functools import partial, update_wrapper
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeAlias, TypeVar, overload
 
@@ -90,7 +90,7 @@ def until(end: bytes) -> Callable[[bytes], int | None]:
 class Driver:
     """A host's side of one unit. `title` is what errors call it; `forget` drops what is known of a unit on a line."""
 
-    title: str = "unit"
+    title: str
 
     def forget(self) -> None:
         """The connection was lost: whatever was agreed on with the unit must be agreed on again."""
@@ -171,7 +171,16 @@ class _Shell:
 
     def _lost(self, error: OSError) -> PortLost:
         self.driver.forget()
-        return PortLost(self.driver.title, f"the port is gone: {error.strerror or error}")
+        lost = PortLost(self.driver.title, f"the port is gone: {error.strerror or error}")
+        lost.__cause__ = error
+        return lost
+
+
+def _next(steps: Steps[T], answer: Answer | PortLost | None) -> Step:
+    """The next step of an operation. A lost port is raised inside it: it may have to say what is where now."""
+    if isinstance(answer, PortLost):
+        return steps.throw(answer)
+    return next(steps) if answer is None else steps.send(answer)
 
 
 class Blocking(_Shell):
@@ -186,12 +195,12 @@ class Blocking(_Shell):
 
     def perform(self, steps: Steps[T]) -> T:
         """Carry out the steps of an operation of the plain driver; its result. Raises DriverError."""
-        answer: Answer | None = None
-        with ExitStack() as turn:
+        answer: Answer | PortLost | None = None
+        with closing(steps), ExitStack() as turn:  # who is interrupted learns of it now, and not from the collector
             mine = False
             while True:
                 try:
-                    step = next(steps) if answer is None else steps.send(answer)
+                    step = _next(steps, answer)
                 except StopIteration as end:
                     return end.value  # type: ignore[no-any-return]
                 if isinstance(step, Rest):
@@ -203,7 +212,7 @@ class Blocking(_Shell):
                 try:
                     answer = self._do(step)
                 except OSError as error:
-                    raise self._lost(error) from error
+                    answer = self._lost(error)
 
     def _do(self, step: Step) -> Answer:
         match step:
@@ -255,12 +264,16 @@ class Asynchronous(_Shell):
 
     async def perform(self, steps: Steps[T]) -> T:
         """Carry out the steps of an operation of the plain driver; its result. Raises DriverError."""
-        answer: Answer | None = None
+        with closing(steps):  # who is cancelled learns of it now, and not from the collector
+            return await self._perform(steps)
+
+    async def _perform(self, steps: Steps[T]) -> T:
+        answer: Answer | PortLost | None = None
         async with AsyncExitStack() as turn:
             mine = False
             while True:
                 try:
-                    step = next(steps) if answer is None else steps.send(answer)
+                    step = _next(steps, answer)
                 except StopIteration as end:
                     return end.value  # type: ignore[no-any-return]
                 if isinstance(step, Rest):
@@ -272,7 +285,7 @@ class Asynchronous(_Shell):
                 try:
                     answer = await self._do(step)
                 except OSError as error:
-                    raise self._lost(error) from error
+                    answer = self._lost(error)
 
     async def _do(self, step: Step) -> Answer:
         match step:

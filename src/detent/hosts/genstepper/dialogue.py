@@ -1,0 +1,107 @@
+"""One exchange with a BS0610 or BS0710 board under GenStepper 2.18 (manual, pages 22 to 24, 35, 39 and 40).
+
+There are no frames: every command character is answered by the prompt ``*``, behind the text if it has one, and any
+new character drops what has not been sent yet. So an exchange is one write - the motor's letter, the commands, and a
+report as the last - and is over with the text of that report and its prompt. Prompts of the commands before it may
+come or not; they look like no report. Nothing is sent while an answer is due. After a silence ``00`` flushes what may
+still come.
+"""
+
+import re
+from enum import IntEnum
+from typing import Final
+
+from detent.hosts.axis import Axis
+from detent.hosts.errors import BadAnswer, NoAnswer, Spoken
+from detent.hosts.exchange import Ask, Clear, Pause, Steps
+
+MOTORS: Final = ("X", "Y")
+LINE_BITS = 12  # a character of an answer, with the two more stop bits of V bit 1
+LONGEST = 150  # characters of an answer: all reports of a motor
+PATIENCE = 1.0  # seconds that a board, an adapter and this computer may take to begin an answer
+TRIES = 3
+FLUSH = b"00"
+FLUSH_SECONDS = 0.05  # until the character that was being sent has come, through whatever adapter
+
+ACTION = -8
+
+
+class Action(IntEnum):
+    """What a motor does: report -8 (page 42)."""
+
+    IDLE = 0
+    RAMPING_UP = 1
+    RUNNING = 2
+    SLOWING = 3
+    SLEWING = 4
+    STOPPING = 5
+    REVERSING = 6
+    STOPPING_TO_GO = 7
+    FINISHED = 8
+
+
+class Dialogue(Axis):
+    """One motor of a board, `motor` X or Y; the drivers of both share the port.
+
+    `baud` as the board is made for; `patience` is how many seconds it may take to begin an answer.
+    """
+
+    def __init__(self, motor: str = "X", *, baud: int = 9600, patience: float = PATIENCE) -> None:
+        if motor not in MOTORS:
+            raise ValueError(f"a board has the motors {' and '.join(MOTORS)}, not {motor!r}")
+        self.motor = motor
+        self.title = f"motor {motor} of the GenStepper board"
+        self.patience = patience
+        self._timeout = patience + LONGEST * LINE_BITS / baud
+        self._stale = True  # something may have come, or may still come, that nobody asked for
+
+    def forget(self) -> None:
+        """The connection was lost: what comes first may be old."""
+        self._stale = True
+
+    def ask(  # type: ignore[override]  # a question in commands, where the base has bytes
+        self, commands: str, number: int, *, again: bool = True
+    ) -> Steps[tuple[int, ...]]:
+        """Say `commands` to the motor, then ask for report `number`; its values, eleven for report 0.
+
+        `again`: all of it may be said again if the answer does not come whole. Raises NoAnswer, BadAnswer.
+        """
+        values = 11 if number == 0 else 1
+        wanted = re.compile(rb"%b,%d((?:,-?\d+){%d})(?:\r\n)?\*" % (self.motor.encode(), number, values))
+        found = yield from self.exchange(f"{self.motor}{commands}{number}?", wanted, again=again)
+        return tuple(int(value) for value in found[1].split(b",")[1:])
+
+    def order(self, commands: str, *, again: bool = True) -> Steps[Action]:
+        """Say `commands` to the motor; returned is what it does then."""
+        (action,) = yield from self.ask(commands, ACTION, again=again)
+        return Action(action)
+
+    def exchange(
+        self, text: str, wanted: re.Pattern[bytes], *, again: bool = False, more: float = 0.0
+    ) -> Steps[re.Match[bytes]]:
+        """Send `text` and wait until `wanted` has come, for `more` seconds longer than an answer takes."""
+        data, timeout = text.encode("ascii"), self._timeout + more
+        if self._stale:
+            yield from self._flush()
+        self._stale = True
+        for left in reversed(range(TRIES)):
+            answer = yield Ask(data, lambda came: found.end() if (found := wanted.search(came)) else None, timeout)
+            match = wanted.search(answer.data)
+            if match is not None:
+                self._stale = False
+                return match
+            yield from self._flush()
+            if not (left and again):
+                break
+        spoken = Spoken(data, answer.data)
+        advice = "" if again else "; it may have obeyed: ask moving() and position()"
+        if b"*" in answer.data:
+            raise BadAnswer(self.title, f"its answer was damaged{advice}", spoken)
+        what = "does not finish its answer" if answer.data else "does not answer"
+        raise NoAnswer(self.title, f"{what} within {timeout:.3g} s{advice}", spoken)
+
+    def _flush(self) -> Steps[None]:
+        """Drop what the board may still have to say, and what it has said."""
+        yield Ask(FLUSH)
+        yield Pause(FLUSH_SECONDS)
+        yield Clear()

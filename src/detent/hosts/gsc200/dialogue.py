@@ -1,0 +1,205 @@
+"""One exchange with a GS-C200: what is said again, and when (datasheet, figure 4 and the error code table).
+
+A frame that the module found damaged (E1) changed nothing, so it is sent again whatever it says. When the ANSWER was
+damaged or lost, the module may have obeyed: then only what may safely be obeyed twice is said again.
+"""
+
+import re
+from collections.abc import Generator
+from enum import Enum
+from typing import Final, NamedTuple, TypeVar
+
+from detent.hosts.axis import Axis
+from detent.hosts.errors import BadAnswer, Busy, DriverError, MotionFailed, NoAnswer, Refused, Spoken
+from detent.hosts.exchange import Answer, Ask, Clear, Pause, Step, Steps, operation
+from detent.hosts.gsc200.frames import LINE_BITS, Frames
+from detent.hosts.gsc200.language import GS_C200S, MODELS
+
+T = TypeVar("T")
+
+ERRORS: Final = {
+    "E1": "parity error when receiving one or more characters, checksum error, or too long a command string",
+    "E2": "command argument out of limit or not requested",
+    "E3": "storage capacity overflow",
+    "E4": "not allowed or not executable command",
+    "E5": "overflow of the position counter",
+    "E6": "EEPROM programming error",
+}
+
+LONGEST = 12  # characters of an answer, its checksum and CR among them
+PATIENCE = 1.0  # seconds that a module, an adapter and this computer may take to begin an answer
+TRIES = 3
+MOMENT = 0.005  # seconds between two questions whether a short command is done
+MOMENTS = 200
+
+MODES: Final = {"P": True, "Po": True, "P0": True, "Px": False, "E": False}
+"""The commands that enter and leave programming mode."""
+
+ORDERED = re.compile(r"Y|B|E[1-6]")
+STATE = re.compile(r"R|B|E[1-6]")
+
+
+class Again(Enum):
+    """Whether a command may be said again when its answer was damaged or did not come."""
+
+    AT_ONCE = "obeyed twice it does what it does once"
+    WHEN_READY = "so, too, once the module is ready"
+    NEVER = "obeyed twice it does more"
+
+
+class Feedback(NamedTuple):
+    """The answer to F: whether the module is busy, and the error that it kept (``E5``), told once."""
+
+    busy: bool
+    error: str = ""
+
+
+class Dialogue(Axis):
+    """One module on a line, which it may share with others (multipoint).
+
+    `model` is gs-c200 or gs-c200s; `address` 1 to 7, or None point to point; `checksums` as CHS is strapped;
+    `revision` that of a GS-C200's firmware (up to V2.1 checksums are not ORed); `baud` as BR0 to BR2 are strapped.
+    `patience` is how many seconds a module may take before it answers, beside what its characters take.
+    """
+
+    def __init__(
+        self,
+        model: str = MODELS[0],
+        *,
+        address: int | None = None,
+        checksums: bool = True,
+        revision: str = "2.2",
+        baud: int = 9600,
+        patience: float = PATIENCE,
+    ) -> None:
+        if model not in MODELS:
+            raise ValueError(f"no model {model!r} is driven so; it is {' or '.join(MODELS)}")
+        if address is not None and address not in range(1, 8):
+            raise ValueError(f"an address is 1 to 7 (multipoint), or None (point to point), not {address!r}")
+        number = re.fullmatch(r"[Vv]?(\d+)\.(\d+)", revision)
+        if number is None:
+            raise ValueError(f"a revision is written like 2.1 or 2.2, not {revision!r}")
+        self.model = model
+        self.signed = model == GS_C200S
+        """A GS-C200S: a counter with a sign, jumps, presets, and a way out of programming mode."""
+        self.frames = Frames(address, checksums, self.signed or (int(number[1]), int(number[2])) >= (2, 2))
+        self.title = model.upper() + ("" if address is None else f" at address {address}")
+        self.patience = patience
+        self._character = LINE_BITS / baud
+        self.programming = False
+        """Whether this driver has put the module into programming mode, where commands are stored."""
+        self._stale = True  # something may have come that nobody asked for
+        self._unended = False  # the last frame may have lost its end: then it is the beginning of the next
+        self._spoken: Spoken | None = None  # the last exchange that was understood
+
+    def forget(self) -> None:
+        """The connection was lost: what comes first may be old, and the module may have been switched off."""
+        self._stale = self._unended = True
+        self.programming = False
+
+    # -- exchanges ---------------------------------------------------------------------------------------
+
+    def say(self, command: str, wanted: re.Pattern[str], again: Again, more: float = 0.0) -> Steps[str]:
+        """The answer to `command`, which is one of `wanted`; E1 and what is damaged is dealt with.
+
+        `more` is how many seconds the answer may take beyond what any may. Raises NoAnswer, BadAnswer, Refused (E1).
+        """
+        data = self.frames.dress(command)
+        timeout = self.patience + more + self._character * (len(data) + LONGEST)
+        if self._stale:
+            yield Clear()
+        self._stale = True
+        for left in reversed(range(TRIES)):
+            answer = yield Ask(data, self.frames.end, timeout)
+            text = self.frames.text(answer.data) if answer.whole else None
+            unheard = text == "E1" or (self._unended and text in ("E2", "E4") and left > 0)
+            if text is not None and not unheard and wanted.fullmatch(text):
+                self._stale = self._unended = False
+                self._spoken = Spoken(data, answer.data)
+                if text == "Y" and command in MODES:
+                    self.programming = MODES[command]
+                return text
+            self._unended = not unheard
+            trouble = self._trouble(command, answer, Spoken(data, answer.data), timeout, unheard, again)
+            if not unheard:
+                yield from self._quiet()
+            if not left or not (unheard or again is not Again.NEVER):
+                raise trouble
+            if again is Again.WHEN_READY and not unheard and not (yield from self._settled()):
+                raise trouble
+        raise AssertionError("the last try returned or raised")
+
+    def order(self, command: str, again: Again, more: float = 0.0) -> Steps[None]:
+        """Say a command that is answered Y. Raises Busy, Refused with the datasheet's words."""
+        self.judge(command, (yield from self.say(command, ORDERED, again, more)))
+
+    def delayed(self, command: str, again: Again) -> Steps[None]:
+        """Say a command of the delayed execution type; while programming it is stored, and then never said twice."""
+        yield from self.order(command, Again.NEVER if self.programming else again)
+
+    def setting(self, command: str) -> Steps[None]:
+        """A delayed command that is over in a moment: it is obeyed when this returns. Raises Busy."""
+        yield from self.delayed(command, Again.WHEN_READY)
+        if not self.programming and not (yield from self._settled()):
+            raise Busy(self.title, f"is still busy with {command}: wait()", code="B")
+
+    def judge(self, command: str, text: str) -> None:
+        """Raise Busy or Refused if `text`, the answer to `command`, says so."""
+        if text == "B":
+            raise Busy(self.title, f"is busy and does not obey {command}: wait(), stop() or halt()", self._spoken, "B")
+        if text in ERRORS:
+            raise Refused(self.title, f"refuses {command}: {ERRORS[text]} ({text})", self._spoken, text)
+
+    @operation
+    def feedback(self) -> Steps[Feedback]:
+        """F: whether it is busy; an error that ended a program is told once."""
+        text = yield from self.say("F", STATE, Again.AT_ONCE)
+        return Feedback(text == "B", text if text.startswith("E") else "")
+
+    @operation
+    def moving(self) -> Steps[bool]:
+        """Whether it is busy: with a move, homing, or a program. Raises MotionFailed for an error that it kept."""
+        busy, error = yield from self.feedback()
+        if error:
+            raise MotionFailed(self.title, f"ended early: {ERRORS[error]} ({error})")
+        return busy
+
+    # -- what goes wrong ---------------------------------------------------------------------------------
+
+    def _settled(self) -> Steps[bool]:
+        """Wait until it is ready, a moment at most. Whether it is."""
+        for _ in range(MOMENTS):
+            if not (yield from self.moving()):
+                return True
+            yield Pause(MOMENT)
+        return False
+
+    def _quiet(self) -> Steps[None]:
+        """Let whatever may still come pass by."""
+        while (yield Ask(b"", len_or_none, 2 * LONGEST * self._character)).data:
+            pass
+
+    def _trouble(
+        self, command: str, answer: Answer, spoken: Spoken, timeout: float, unheard: bool, again: Again
+    ) -> DriverError:
+        if unheard:
+            what = f"does not receive {command} undamaged: {ERRORS['E1']} (E1); is CHS strapped as checksums says?"
+            return Refused(self.title, what, spoken, "E1")
+        advice = "" if again is Again.AT_ONCE else f"; it may have obeyed {command}: ask moving() and position()"
+        if answer.whole:
+            return BadAnswer(self.title, f"its answer to {command} was damaged{advice}", spoken)
+        what = "does not finish its answer" if answer.data else "does not answer"
+        return NoAnswer(self.title, f"{what} to {command} within {timeout:.3g} s{advice}", spoken)
+
+
+def len_or_none(data: bytes) -> int | None:
+    """Complete as soon as anything is there, with all of it."""
+    return len(data) or None
+
+
+def attempt(steps: Generator[Step, Answer, T]) -> Generator[Step, Answer, T | DriverError]:
+    """The result of `steps`, or the error that ended them, for whoever has to mend things first."""
+    try:
+        return (yield from steps)
+    except DriverError as error:
+        return error

@@ -1,0 +1,397 @@
+"""Host side of the SUPERSIGMA robot: the Central Control Unit of its MICROBUS, and one drive as an axis.
+
+It knows the messages of the drives (Cassinis, table 1; the codes are Detent's: docs/controllers/supersigma.md) and no
+more. Steps are half steps, with a sign: forward is plus; speeds are half steps/s, multiples of 100. Only status is
+answered, so whether a command was taken is known when the drive is asked.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from math import asin, sqrt
+from typing import Final, NamedTuple
+
+from detent.hosts.axis import POLL, Axis, Limits, Speeds
+from detent.hosts.errors import Busy, MotionFailed, NoAnswer, Spoken
+from detent.hosts.exchange import Ask, Asynchronous, Blocking, Clear, Driver, Rest, Steps, length, operation
+from detent.hosts.interpolation import LARGEST_SPEED, UNIT, legs, order_of
+
+MOVE, CONSTANT, LIMIT, ORIGINATE, STATUS, STOP, EMERGENCY = range(1, 8)
+BACKWARD: Final = 0x80
+LARGEST_STEPS: Final = 0xFFFF
+PATIENCE: Final = 0.5  # seconds for the answer to status, beyond what its bytes take
+# The curve of the paper, V = 15000 sin^2(4.54426 t + 0.2097) half steps/s: where ramps begin, and where they end.
+LOW, TOP, _RATE, _PHASE = 650, 15_000, 4.54426, 0.2097
+
+
+class Report(NamedTuple):
+    """An answer to status: the steps of the last movement or of the one under way, and the flags."""
+
+    steps: int
+    flags: int
+
+    @property
+    def moving(self) -> bool:
+        """The motor moves."""
+        return bool(self.flags & 0x01)
+
+    @property
+    def end_of_rail(self) -> bool:
+        """The end of the rail was met."""
+        return bool(self.flags & 0x02)
+
+    @property
+    def excessive_force(self) -> bool:
+        """There was excessive force."""
+        return bool(self.flags & 0x04)
+
+    @property
+    def originated(self) -> bool:
+        """The origin has been found."""
+        return bool(self.flags & 0x08)
+
+    @property
+    def refused(self) -> bool:
+        """A command was refused."""
+        return bool(self.flags & 0x10)
+
+
+class DriveFailed(MotionFailed):
+    """A drive did not do what it was told: its number, and what it reported."""
+
+    def __init__(self, drive: int, what: str, report: Report) -> None:
+        super().__init__(f"drive {drive}", what)
+        self.drive, self.report = drive, report
+
+
+class Supersigma(Axis):
+    """One drive, `drive` its number on the bus; several may share a port.
+
+    A drive does not count positions. The driver does, from the steps that status reports of each movement, and knows
+    of no other movements: if somebody else moves the drive, a second host or a `Ccu` on the same port, the position
+    is wrong until the next `home` or `set_position`.
+    """
+
+    def __init__(self, drive: int = 1, *, patience: float = PATIENCE) -> None:
+        """Raises ValueError."""
+        _drive(drive)
+        self.drive, self._patience = drive, patience
+        self.title = f"drive {drive}"
+        self._limit: int | None = None  # of moves with ramps, half steps/s
+        self._from = 0  # where the movement that is accounted for began, or the drive stands
+        self._direction = 0  # of that movement; 0: there is none
+        self._last = 0  # direction of the last movement
+        self._originating = False
+
+    # -- the drive's own commands ------------------------------------------------------------------------
+
+    @operation
+    def status(self) -> Steps[Report]:
+        """Steps of the last movement or of the one under way, and flags. Raises NoAnswer."""
+        report = yield from _ask(self.drive, self._patience)
+        if self._direction and not report.moving:
+            if not report.refused:  # then the steps are those of the movement before
+                self._from = self._place(report)
+            self._direction = 0
+        return report
+
+    @operation
+    def move(self, steps: int, *, limit: int | None = None) -> Steps[None]:
+        """Begin a movement with ramps, at no more than `limit` half steps/s if that is given. Raises Busy."""
+        if limit is None:
+            yield from self._begin(message(self.drive, MOVE, steps), steps)
+        else:
+            yield from self._begin(message(self.drive, LIMIT, steps, limit), steps)
+
+    @operation
+    def constant(self, steps: int, speed: int) -> Steps[None]:
+        """Begin a movement at `speed` half steps/s without ramps. Raises Busy."""
+        yield from self._begin(message(self.drive, CONSTANT, steps, speed), steps)
+
+    @operation
+    def originate(self) -> Steps[None]:
+        """Begin the search for the origin, backward to the end of the rail. It is position 0. Raises Busy."""
+        yield from self._begin(message(self.drive, ORIGINATE), -1)
+        self._originating = True
+
+    @operation
+    def emergency(self) -> Steps[None]:
+        """Stop by the steepest ramp."""
+        yield Ask(message(self.drive, EMERGENCY))
+
+    def _begin(self, data: bytes, steps: int) -> Steps[None]:
+        """A drive refuses to begin while it moves, and tells only when it is asked: it is asked first."""
+        if (yield from self.status()).moving:
+            raise self._busy()
+        yield Ask(data)
+        self._direction = self._last = 1 if steps > 0 else -1
+        self._originating = False
+
+    def _busy(self) -> Busy:
+        return Busy(self.title, "moves: wait() for its end, or stop() it")
+
+    def _place(self, report: Report) -> int:
+        """Where the drive is. While it looks for its origin it is backward of where it began: its steps say no more."""
+        if self._originating:
+            return 0 if report.originated and not report.moving else self._from
+        return self._from + self._direction * report.steps
+
+    # -- the common face ---------------------------------------------------------------------------------
+
+    @operation
+    def move_to(self, position: int) -> Steps[None]:
+        """Begin a movement to `position`, 65 535 half steps away at most; none if it is there. Raises Busy."""
+        if (yield from self.moving()):
+            raise self._busy()
+        yield from self.move_by(position - self._from)
+
+    @operation
+    def move_by(self, steps: int) -> Steps[None]:
+        """Begin a movement by `steps`, with ramps, within the speed that `set_speeds` has set."""
+        if steps:
+            yield from self.move(steps, limit=self._limit)
+
+    @operation
+    def run_at(self, rate: float) -> Steps[None]:
+        """A drive makes a number of steps, never an endless run. Raises ValueError."""
+        raise ValueError(f"a drive moves by a number of steps: constant(steps, speed), up to {LARGEST_STEPS} of them")
+        yield
+
+    @operation
+    def stop(self) -> Steps[None]:
+        """Stop through the ramp."""
+        yield Ask(message(self.drive, STOP))
+
+    @operation
+    def halt(self) -> Steps[None]:
+        """The emergency brake: a drive never just cuts its pulses."""
+        yield from self.emergency()
+
+    @operation
+    def home(self, direction: int = -1) -> Steps[None]:
+        """Begin the search for the origin, which always goes backward: -1. Position 0 is there."""
+        if direction != -1:
+            raise ValueError("a drive looks for its origin backward: home(-1), or originate()")
+        yield from self.originate()
+
+    @operation
+    def position(self) -> Steps[int]:
+        """Where the movements of this driver have brought it; during a search for the origin, where that began."""
+        report = yield from self.status()
+        return self._place(report) if self._direction else self._from
+
+    @operation
+    def set_position(self, position: int) -> Steps[None]:
+        """Call the place where the drive is `position`, on this side only. Raises Busy during a search."""
+        here = yield from self.position()
+        if self._direction and self._originating:
+            raise Busy(self.title, "looks for its origin, which will be position 0")
+        self._from += position - here
+
+    @operation
+    def moving(self) -> Steps[bool]:
+        """Whether the motor moves."""
+        return (yield from self.status()).moving
+
+    @operation
+    def set_speeds(self, speeds: Speeds) -> Steps[Speeds]:
+        """Keep moves below `slew`, rounded down to hundreds. Start and ramp are those of the drive's table.
+
+        What is returned counts for the paper's table. Nothing is sent: the limit goes with each move.
+        """
+        if speeds.slew < UNIT:
+            raise ValueError(f"a speed limit is {UNIT} half steps/s or more, not {speeds.slew:g}")
+        limit = int(speeds.slew // UNIT) * UNIT
+        self._limit = limit if limit < TOP else None
+        if limit <= LOW:
+            return Speeds(LOW, LOW, 0.0)
+        slew = min(limit, TOP)
+        return Speeds(LOW, slew, (asin(sqrt(slew / TOP)) - _PHASE) / _RATE)
+        yield
+
+    @operation
+    def limits(self) -> Steps[Limits]:
+        """The end of the rail, if the last movement met it: which end, the direction of that movement tells."""
+        met = (yield from self.status()).end_of_rail
+        return Limits(met and self._last < 0, met and self._last > 0)
+
+    @operation
+    def wait(self, timeout: float | None = None) -> Steps[None]:
+        """Wait until the drive stands. Raises DriveFailed for an emergency, a refusal, an origin that was not found."""
+        yield from super().wait(timeout)
+        report = yield from self.status()
+        originating, self._originating = self._originating, False
+        _check(self.drive, report)
+        if originating and not report.originated:
+            raise DriveFailed(self.drive, "found no origin", report)
+
+
+class Ccu(Driver):
+    """The drives of one MICROBUS together: each call names the drive or the drives. It keeps no positions."""
+
+    title = "CCU"
+
+    def __init__(self, *, poll: float = POLL, patience: float = PATIENCE) -> None:
+        """`poll`: seconds between two questions whether drives have arrived."""
+        self._poll, self._patience = poll, patience
+
+    # -- single drives -----------------------------------------------------------------------------------
+
+    @operation
+    def move(self, drive: int, steps: int, *, limit: int | None = None) -> Steps[None]:
+        """Begin a movement with ramps, at no more than `limit` half steps/s if that is given."""
+        yield Ask(_move(drive, steps, limit))
+
+    @operation
+    def move_constant(self, drive: int, steps: int, speed: int) -> Steps[None]:
+        """Begin a movement at `speed` half steps/s without ramps."""
+        yield Ask(message(drive, CONSTANT, steps, speed))
+
+    @operation
+    def originate(self, drive: int) -> Steps[None]:
+        """Begin the search for the origin."""
+        yield Ask(message(drive, ORIGINATE))
+
+    @operation
+    def stop(self, drive: int) -> Steps[None]:
+        """Stop through the ramp."""
+        yield Ask(message(drive, STOP))
+
+    @operation
+    def emergency(self, drive: int) -> Steps[None]:
+        """Stop by the steepest ramp."""
+        yield Ask(message(drive, EMERGENCY))
+
+    @operation
+    def status(self, drive: int) -> Steps[Report]:
+        """Ask a drive. Raises NoAnswer."""
+        return (yield from _ask(drive, self._patience))
+
+    # -- several drives ----------------------------------------------------------------------------------
+
+    @operation
+    def wait_for(self, *drives: int) -> Steps[dict[int, Report]]:
+        """Wait until all of `drives` are at rest; their reports.
+
+        Raises DriveFailed as soon as one tells of an emergency or a refused command.
+        """
+        reports: dict[int, Report] = {}
+        waiting = list(drives)
+        while waiting:
+            for drive in tuple(waiting):
+                report = reports[drive] = yield from self.status(drive)
+                _check(drive, report)
+                if not report.moving:
+                    waiting.remove(drive)
+            if waiting:
+                yield Rest(self._poll)
+        return reports
+
+    @operation
+    def move_all(self, steps: Mapping[int, int], *, limit: int | None = None) -> Steps[dict[int, Report]]:
+        """Move several drives at once, each as fast as it can, and wait until all have arrived."""
+        return (yield from self._all(steps, lambda drive: _move(drive, steps[drive], limit)))
+
+    @operation
+    def originate_all(self, drives: Iterable[int]) -> Steps[dict[int, Report]]:
+        """Find the origins of several drives at once, and wait until all are found."""
+        reports = yield from self._all(dict.fromkeys(drives, 1), lambda drive: message(drive, ORIGINATE))
+        for drive, report in reports.items():
+            if not report.originated:
+                raise DriveFailed(drive, "found no origin", report)
+        return reports
+
+    @operation
+    def move_line(self, steps: Mapping[int, int], *, speed: int = 600) -> Steps[None]:
+        """Move several drives on a straight line and wait until they have arrived, all together.
+
+        The longest axis goes at `speed` half steps/s at most: constant speeds have no ramps, so the motors must be
+        able to start at it. No axis is ever a whole step of its own away from the line.
+        """
+        fastest = _units(speed)
+        drives = [drive for drive, count in steps.items() if count]
+        distances = [steps[drive] for drive in drives]
+        for drive, count in zip(drives, distances, strict=True):
+            message(drive, CONSTANT, count, speed)
+        order = order_of(distances)
+        for leg in legs(distances, fastest):
+            started = [place for place in order if leg.steps[place]]
+            # One write, so that the drives start one message apart, as the legs are reckoned.
+            yield Ask(b"".join(
+                message(drives[place], CONSTANT, leg.steps[place], leg.speeds[place] * UNIT) for place in started
+            ))  # fmt: skip
+            yield Rest(leg.seconds)
+            yield from self.wait_for(*(drives[place] for place in started))
+
+    def _all(self, steps: Mapping[int, int], start: Callable[[int], bytes]) -> Steps[dict[int, Report]]:
+        drives = [drive for drive, count in steps.items() if count]
+        for data in [start(drive) for drive in drives]:
+            yield Ask(data)
+        return (yield from self.wait_for(*drives))
+
+
+def message(drive: int, code: int, steps: int | None = None, speed: int | None = None) -> bytes:
+    """One message (table 1): number, op-code with the direction, steps, speed. Raises ValueError."""
+    data = bytearray([_drive(drive), code])
+    if steps is not None:
+        if not 1 <= abs(steps) <= LARGEST_STEPS:
+            raise ValueError(f"a movement has 1 to {LARGEST_STEPS} steps, forward (+) or backward (-), not {steps}")
+        data[1] |= BACKWARD if steps < 0 else 0
+        data += abs(steps).to_bytes(2, "big")
+    if speed is not None:
+        data.append(_units(speed))
+    return bytes(data)
+
+
+def _move(drive: int, steps: int, limit: int | None) -> bytes:
+    return message(drive, MOVE, steps) if limit is None else message(drive, LIMIT, steps, limit)
+
+
+def _drive(drive: int) -> int:
+    """`drive`, if it can be the number of one. Raises ValueError."""
+    if not 0 <= drive <= 0xFF:
+        raise ValueError(f"a drive has a number of 0 to 255, not {drive}")
+    return drive
+
+
+def _units(speed: int) -> int:
+    """The byte of a speed. Raises ValueError for one that it cannot hold."""
+    units, rest = divmod(speed, UNIT)
+    if rest or not 1 <= units <= LARGEST_SPEED:
+        raise ValueError(f"a speed is a multiple of {UNIT} half steps/s up to {LARGEST_SPEED * UNIT}, not {speed}")
+    return units
+
+
+def _ask(drive: int, patience: float) -> Steps[Report]:
+    """Status of a drive. A late answer to an earlier question is not taken for it."""
+    yield Clear()
+    data = message(drive, STATUS)
+    answer = yield Ask(data, length(3), patience)
+    if not answer.whole:
+        what = "does not finish its answer" if answer.data else "does not answer status"
+        raise NoAnswer(f"drive {drive}", f"{what} within {patience:g} s", Spoken(data, answer.data))
+    return Report(int.from_bytes(answer.data[:2], "big"), answer.data[2])
+
+
+def _check(drive: int, report: Report) -> None:
+    """Raise DriveFailed for an emergency or a refused command."""
+    if report.end_of_rail:
+        raise DriveFailed(drive, f"met the end of its rail after {report.steps} steps", report)
+    if report.excessive_force:
+        raise DriveFailed(drive, f"met excessive force after {report.steps} steps", report)
+    if report.refused:
+        raise DriveFailed(drive, "refused a command", report)
+
+
+class BlockingSupersigma(Blocking, Supersigma):
+    """A drive whose operations are calls."""
+
+
+class AsyncSupersigma(Asynchronous, Supersigma):
+    """A drive whose operations are coroutines."""
+
+
+class BlockingCcu(Blocking, Ccu):
+    """A CCU whose operations are calls."""
+
+
+class AsyncCcu(Asynchronous, Ccu):
+    """A CCU whose operations are coroutines."""

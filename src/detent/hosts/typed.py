@@ -1,0 +1,180 @@
+"""A line as a person types it, and what the unit says to it: what `detent send` and `detent terminal` do.
+
+The driver adds what the protocol demands: checksum and CR, the echo of each character, the name of an axis. What is
+answered comes back as it was said, with its meaning where the manual gives one.
+"""
+
+import re
+from functools import singledispatch
+from typing import Final, NamedTuple
+
+from detent.hosts.dcb274 import Dcb274
+from detent.hosts.errors import BadAnswer, Refused, Spoken
+from detent.hosts.exchange import Ask, Clear, Driver, Steps
+from detent.hosts.genstepper import GenStepper
+from detent.hosts.gsc200 import GsC200
+from detent.hosts.gsc200.commands import EEPROM_SECONDS
+from detent.hosts.gsc200.dialogue import ERRORS, Again
+from detent.hosts.interpolation import UNIT
+from detent.hosts.supersigma import Report, Supersigma
+
+FOR_EVER: Final = 86_400.0  # seconds: as long as the motion takes that is waited for
+ANYTHING: Final = re.compile(r"(?s).+")
+SLOWEST_FRAME: Final = 12 * 11 / 110  # seconds: the longest answer of a GS-C200 at 110 baud
+
+
+class Said(NamedTuple):
+    """The lines that were answered, as they came; what they mean; whether the unit said no."""
+
+    answers: tuple[str, ...]
+    meaning: str = ""
+    refused: bool = False
+
+
+@singledispatch
+def say(driver: Driver, line: str) -> Steps[Said]:
+    """Say one line to the unit of `driver`; what it said. Raises DriverError, and ValueError for what is no line."""
+    raise NotImplementedError(f"nobody knows how a line is typed to {driver.title}")
+    yield
+
+
+def raw(data: bytes, seconds: float) -> Steps[bytes]:
+    """Send bytes as they are; everything that comes within so many seconds."""
+    yield Clear()
+    answer = yield Ask(data, lambda came: None, seconds)
+    return answer.data
+
+
+# -- GS-C200 ---------------------------------------------------------------------------------------------------
+
+
+@say.register
+def _(driver: GsC200, line: str) -> Steps[Said]:
+    line = line.strip()
+    if not line or not line.isascii() or not line.isprintable():
+        raise ValueError(f"{line!r} is no command line: type a command like F, V1 or +100")
+    more = EEPROM_SECONDS if line[0] == "M" else 0.0
+    text: str | None = yield from driver.say(line, ANYTHING, Again.NEVER, more)
+    answers = []
+    while text is not None:
+        answers.append(text)
+        if line != "Q" or text in ("END", "B", *ERRORS):
+            return Said(tuple(answers), _meaning(line, text), text[:2] in ERRORS or (text == "B" and line != "F"))
+        answer = yield Ask(b"", driver.frames.end, driver.patience + SLOWEST_FRAME)  # a listing: a frame a line
+        text = driver.frames.text(answer.data) if answer.whole else None
+    raise BadAnswer(driver.title, "its list of the program was damaged", Spoken(driver.frames.dress(line), answer.data))
+
+
+def _meaning(line: str, text: str) -> str:
+    """The datasheet's words for an answer."""
+    if text[:2] in ERRORS:
+        return ERRORS[text[:2]] + ("; it answers with a checksum, so it wants one" if text[2:] else "")
+    if line.startswith("V2") and re.fullmatch(r"V[0-7][0-7]", text):
+        levels = ((kind, int(figure)) for kind, figure in zip(("UI", "UO"), text[1:], strict=True))
+        return ", ".join(f"{kind}{n + 1}={value >> n & 1}" for kind, value in levels for n in range(3))
+    if line.startswith("V1") and re.fullmatch(r"V[+-]?\d+", text):
+        return f"position {int(text[1:])}"
+    return _WORDS.get(text, "")
+
+
+_WORDS: Final = {"Y": "done, stored or begun", "B": "busy: a program, a command or a move goes on", "R": "ready"}
+
+
+# -- GenStepper ------------------------------------------------------------------------------------------------
+
+
+@say.register
+def _(driver: GenStepper, line: str) -> Steps[Said]:
+    """Command by command, each when the prompt of the last has come: a new character drops what was not sent yet."""
+    if not line.strip() or not line.isascii() or not line.isprintable():
+        raise ValueError(f"{line!r} is no command line: type commands like -1? or X1000GI")
+    answers: list[str] = []
+    for command in re.findall(r"[-+\d]*[^-+\d]|[-+\d]+$", line.rstrip()):
+        if command[-1] in "+-0123456789":
+            command += " "  # a number alone is not answered; space is a command without an effect
+        more = FOR_EVER if command[-1] in "Ii" else 0.0
+        found = yield from driver.exchange(command, re.compile(rb"(?s)(.*?)\*"), more=more)
+        answers += [text for one in found[1].decode("latin-1").split("\n") if (text := one.strip())]
+    return Said((*answers, "*"), "" if answers else "done")
+
+
+# -- DCB-274 ---------------------------------------------------------------------------------------------------
+
+
+@say.register
+def _(driver: Dcb274, line: str) -> Steps[Said]:
+    """A line; ESC, ^C, ^P and ^N NAME in letters stand for the single characters. Q of single mode reads on."""
+    text = line.strip()
+    if not text.isascii() or not text.isprintable():
+        raise ValueError(f"{line!r} is no command line: type a command like X or +1000, or ESC, ^C, ^P, ^N NAME")
+    try:
+        return (yield from _dcb274(driver, text))
+    except Refused as error:
+        return Said((error.code,), error.what, refused=True)
+
+
+def _dcb274(driver: Dcb274, text: str) -> Steps[Said]:
+    if text.upper() in _SINGLE:
+        what, meaning = _SINGLE[text.upper()]
+        yield from getattr(driver, what)()
+        return Said((), meaning)
+    if text.startswith("^N"):
+        yield from driver.store_name(text[2:].strip())
+        return Said((), "named, for good")
+    listing = re.fullmatch(r"Q ?(\d*)", text)
+    if listing and driver.mode == "single":
+        found = yield from driver.listing(int(listing[1] or 0))
+        return Said((*map(str, found.lines), str(found.end)), "" if found.lines else "no program there")
+    answer = yield from driver.command(text, FOR_EVER)
+    return Said((answer,) if answer.strip() else (), "" if answer.strip() else "done")
+
+
+_SINGLE: Final = {
+    "ESC": ("abort", "everything stopped at once"),
+    "@": ("stop", "slowing down"),
+    "^C": ("reset", "reset"),
+    "^P": ("party_line", "reset, on a party line now"),
+}
+
+
+# -- SUPERSIGMA ------------------------------------------------------------------------------------------------
+
+
+@say.register
+def _(driver: Supersigma, line: str) -> Steps[Said]:
+    """The words of docs/controllers/supersigma.md; speeds are in units of 100 half steps/s, as on the bus."""
+    words = line.split()
+    match words[:1], [_whole(word) for word in words[1:]]:
+        case ["move"], [steps]:
+            yield from driver.move(steps)
+        case ["limit"], [steps, speed]:
+            yield from driver.move(steps, limit=speed * UNIT)
+        case ["constant"], [steps, speed]:
+            yield from driver.constant(steps, speed * UNIT)
+        case ["originate"], []:
+            yield from driver.originate()
+        case ["stop"], []:
+            yield from driver.stop()
+        case ["emergency"], []:
+            yield from driver.halt()
+        case ["status"], []:
+            return _told((yield from driver.status()))
+        case _:
+            raise ValueError(
+                f"{line!r}: type move STEPS, limit STEPS SPEED, constant STEPS SPEED, originate, status, stop or "
+                "emergency, SPEED in units of 100 half steps/s"
+            )
+    return Said((), "sent; status tells what comes of it")
+
+
+def _told(report: Report) -> Said:
+    flags = ("moving", "end_of_rail", "excessive_force", "originated", "refused")
+    words = [name.replace("_", " ") for name in flags if getattr(report, name)]
+    return Said((f"{report.steps} steps", *words), "" if words else "at rest")
+
+
+def _whole(word: str) -> int:
+    try:
+        return int(word)
+    except ValueError:
+        raise ValueError(f"{word!r} is no whole number") from None

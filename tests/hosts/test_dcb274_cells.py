@@ -1,0 +1,518 @@
+"""The DCB-274's driver against the emulated controller in virtual time, at 9600 baud (page 12)."""
+
+from collections.abc import Callable
+
+import pytest
+
+from detent.cell.build import build
+from detent.cell.cell import Cell
+from detent.cell.description import parse
+from detent.cell.host import HostPort
+from detent.hosts.axis import Limits, Speeds
+from detent.hosts.dcb274 import BlockingDcb274, Dcb274
+from detent.hosts.dcb274.answers import Listed
+from detent.hosts.dcb274.memory import HalfWritten, hex_lines
+from detent.hosts.errors import Busy, MotionFailed, NoAnswer, Refused
+from detent.hosts.exchange import Progress
+
+SWITCHES = """
+[switches.home]
+drives = ["unit.HOME"]
+axis = "unit"
+to = -200
+[switches.plus]
+drives = ["unit.LIMIT-A"]
+axis = "unit"
+from = 5000
+[switches.minus]
+drives = ["unit.LIMIT-B"]
+axis = "unit"
+to = -900
+"""
+
+
+def cell_of(text: str) -> Cell:
+    return build(parse(text, "cell"), lambda file: "")
+
+
+def alone(more: str = "", **port: type[HostPort]) -> tuple[Cell, BlockingDcb274]:
+    cell = cell_of('[units.unit]\nmodel = "dcb-274"\n' + more)
+    return cell, BlockingDcb274(Dcb274(), port.get("port", HostPort)(cell))
+
+
+def three(adapter: str = "", *, party: bool = True, kind: str = "") -> tuple[Cell, HostPort]:
+    """Axes X, Y and Z on one line."""
+    straps = 'straps = { PARTY = "high" }\n' if party else ""
+    text = [f'[units.{name.lower()}]\nmodel = "dcb-274"\noptions = {{ name = "{name}" }}\n{straps}' for name in "XYZ"]
+    if adapter:
+        text += [f'[units.adapter]\nmodel = "{adapter}"\n', '[lines.host]\nunits = ["adapter"]\n']
+    text += ['[lines.bus]\nunits = ["x", "y", "z"]\n', 'host = "adapter"\n' if adapter else "", kind]
+    cell = cell_of("".join(text))
+    return cell, HostPort(cell)
+
+
+def driven(port: HostPort, names: str, mode: str, first: str = "") -> list[BlockingDcb274]:
+    return [BlockingDcb274(Dcb274(name, mode=mode, first=first), port) for name in names]
+
+
+def test_every_call_of_single_mode() -> None:
+    cell, unit = alone()
+    assert unit.connect() == "V1.10"
+    assert unit.examine()[:7] == (5, 5, 802, 10370, 1, "1/4", "A")
+    unit.initial_velocity(400)
+    unit.slew_velocity(5000)
+    unit.ramp_slope(50, 5)
+    unit.divide(2)
+    unit.jog_speeds(30, 100)
+    unit.decay(255)
+    unit.currents(10, 80)
+    unit.pre_energize(0.25)
+    unit.resolution(2)
+    unit.set_options(32)
+    assert unit.options() == 32
+    assert unit.examine() == (50, 5, 400, 5185, 2, "1/2", "A", 255, True, 32)
+    unit.outputs(24)
+    assert unit.ports() == (False, False, False, True)
+    assert unit.inputs() == (False, False, False, True, True, False, False, False)
+    unit.outputs(0)
+    assert unit.jog_inputs() == (False, False, False)
+    unit.set_position(-700)
+    assert unit.position() == -700
+    unit.trip(100, 160)
+    unit.save()
+    unit.reload()
+    assert unit.read_memory(229) == b"\x02"
+    unit.write_memory(1000, 17)
+    assert unit.read_memory(999, 3) == b"\xff\x11\xff"
+    assert unit.clear(4) == "V1.10"
+    assert unit.read_memory(1000) == b"\xff"
+    assert unit.clear(1) == "V1.10"
+    assert unit.examine()[:7] == (5, 5, 802, 10370, 1, "1/4", "A")
+    assert unit.command("E 9") == ""
+    unit.store_name("Q")
+    unit.reset()
+    assert unit.sign_on() == "V1.10"
+    assert unit.name == "Q"
+    assert unit.sign_on("R") == "V1.10"
+    assert unit.examine().name == "R"
+    unit.party_line()
+    assert driven(unit.port, "Q", "party")[0].model_number() == 26
+    assert cell.now < 10 * 10**9
+
+
+def test_moves_begin_and_return_and_the_next_one_waits_its_turn() -> None:
+    cell, unit = alone()
+    unit.move_to(1000)
+    assert unit.moving()
+    assert unit.moving_status() == 1
+    unit.move_by(-300)
+    unit.move_by(-50)
+    unit.wait()
+    assert unit.position() == 650
+    unit.run_at(-3000)
+    assert unit.moving_status() == 3
+    unit.stop()
+    unit.wait()
+    assert unit.position() < 650
+    unit.move_to(0)  # behind M at once: the unit ramps to rest first
+    unit.wait()
+    assert unit.position() == 0
+    unit.run_at(2000)
+    unit.halt()
+    assert not unit.moving()
+    unit.delay(0.5)
+    assert unit.position() == cell.controllers()["unit"].status(cell.now).position
+
+
+def test_an_index_that_a_limit_has_cut_is_told() -> None:
+    _, unit = alone(SWITCHES)
+    unit.move_to(6000)
+    with pytest.raises(MotionFailed, match="stands at 5000, not at 6000: limit A is met"):
+        unit.wait()
+    assert unit.limits() == Limits(low=False, high=True)
+    unit.move_by(-10)
+    unit.wait()
+    assert unit.position() == 4990
+
+
+def test_homing_by_the_switch_and_past_a_limit() -> None:
+    cell, unit = alone(SWITCHES)
+    unit.home()
+    unit.wait()
+    assert cell.controllers()["unit"].status(cell.now).position == -199  # the first step at which it is high again
+    unit.set_position(0)
+    unit.move_to(100)
+    unit.wait()
+    _, lost = alone(SWITCHES.replace("to = -200", "to = -2000"))
+    lost.home(-1)
+    with pytest.raises(MotionFailed, match="met limit B before the home switch"):
+        lost.wait()
+
+
+def test_speeds_are_those_of_the_motor_whatever_divides_them() -> None:
+    cell, unit = alone()
+    made = unit.set_speeds(Speeds(20, 2000, 1.0))
+    assert made.start == pytest.approx(20, rel=0.02)
+    assert made.slew == pytest.approx(2000, rel=0.02)
+    assert made.seconds == pytest.approx(1.0, rel=0.05)
+    begun = cell.now
+    unit.move_by(4000)
+    unit.wait()
+    assert 4000 / 2000 + 1.0 < (cell.now - begun) / 1e9 < 4000 / 2000 + 2.0
+    unit.run_at(-500)
+    unit.port.wait(3)
+    before = unit.position()
+    unit.port.wait(1)
+    assert unit.position() - before == pytest.approx(-500, rel=0.05)
+
+
+def test_programs_are_stored_listed_run_traced_and_ended() -> None:
+    _, unit = alone()
+    lines = ["O 0", "R 400", "W 8", "Z", "P 256", "M 1000", "L 2048 0", "@"]
+    assert unit.write_program(lines)[-1] == Listed(263, "@")
+    assert unit.listing(256).end == 264
+    assert unit.read_program(0) == ["P 0", "O 0", "R 400", "W 8", "Z 0"]
+    assert unit.read_program()[:5] == ["P 0", "O 0", "R 400", "W 8", "Z 0"]
+    assert unit.read_program()[-4:] == ["P 256", "M 1003", "L 2048 0", "@"]
+    assert unit.trace(0) == ["0 O 0", "4 R 400", "8 W 8", "11 Z 0", "      400"]
+    unit.go(0)
+    unit.wait()
+    assert [line.strip() for line in unit.printed()] == ["400"]
+    unit.go(256)
+    assert unit.moving()
+    with pytest.raises(Busy, match="runs a program and takes no line"):
+        unit.position()
+    unit.stop()
+    unit.wait()
+    assert unit.position() > 400
+    unit.go(256)
+    unit.halt()
+    assert not unit.moving()
+    with pytest.raises(Refused, match="new instructions stand at 0 to 3, an end mark at 4"):
+        unit.write_program(["+ 5", "A 130"])
+    assert unit.read_program(0) == ["P 0", "+ 5"]
+    unit.write_program(["@"] * 45)
+    assert unit.listing(0).end == 45
+
+
+def test_a_program_that_somebody_else_has_started_is_stopped_and_not_taken_for_a_dead_line() -> None:
+    cell, unit = alone()
+    unit.write_program(["M 1000", "L 2048 0"])
+    cell.controllers()["unit"].start(cell.now)
+    unit.port.wait(0.5)
+    unit.stop()
+    unit.wait()
+    assert 0 < unit.position() < 2000
+
+
+def test_positions_are_followed_while_they_change() -> None:
+    _, unit = alone()
+    unit.move_by(500)
+    seen = unit.follow(0.3)
+    assert seen == sorted(seen)
+    assert seen[-1] == 500
+    assert len(set(seen)) > 5
+    assert unit.position() == 500
+
+
+def test_continuous_reports_of_another_host_do_not_disturb_the_sign_on() -> None:
+    cell, unit = alone()
+    unit.command("Z 1")
+    unit.run_at(500)
+    other = BlockingDcb274(Dcb274(), HostPort(cell))
+    assert other.examine().name == "A"
+    assert other.position() > 0
+    assert cell.controllers()["unit"].status(cell.now).state == "moving"
+
+
+def test_a_half_typed_line_is_taken_back_and_program_mode_is_left_alone() -> None:
+    cell, unit = alone()
+    unit.connect()
+    unit.port.write(b"+100")
+    unit.port.wait(0.1)
+    other = BlockingDcb274(Dcb274(), HostPort(cell))
+    assert other.position() == 0
+    other.command("P 300")
+    with pytest.raises(Refused, match="is in program mode"):
+        BlockingDcb274(Dcb274(), HostPort(cell)).connect()
+    other.abort()
+    assert other.read_memory(300, 4) == b"\xff" * 4
+
+
+def test_a_unit_that_was_switched_off_and_on_keeps_its_name() -> None:
+    """Page 23: before SPACE any character is a name. A line typed to a unit that waits must not rename it."""
+    cell, unit = alone()
+    unit.move_to(50)
+    unit.wait()
+    device = cell.controllers()["unit"]
+    device.power(False, cell.now)
+    device.power(True, cell.now)
+    with pytest.raises(NoAnswer):
+        unit.position()
+    assert unit.position() == 0
+    assert unit.examine().name == "A"
+
+
+def test_three_axes_of_a_party_line_share_a_port() -> None:
+    cell, port = three()
+    x, y, z = driven(port, "XYZ", "party")
+    x.move_to(1000)
+    y.move_by(-500)
+    z.run_at(2000)
+    assert z.moving()
+    z.stop()
+    for unit in (x, y, z):
+        unit.wait()
+    assert [unit.position() for unit in (x, y)] == [1000, -500]
+    assert (x.model_number(), x.inputs().p1, x.options()) == (26, False, 0)
+    x.write_program(["M 1000", "L 2048 0"])
+    x.go()
+    assert x.moving()
+    y.move_to(0)
+    y.wait()
+    with pytest.raises(Busy, match="runs a program"):
+        x.position()
+    x.stop()
+    x.wait()
+    x.go()
+    y.run_at(1000)
+    x.halt()  # of X alone
+    assert (x.moving(), y.moving()) == (False, True)
+    y.abort()
+    assert not y.moving()
+    with pytest.raises(NoAnswer, match="is not on the line"):
+        driven(port, "Q", "party")[0].position()
+    before = x.position()
+    port.write(b"\nX+55")  # a host that went away in the middle of a line
+    port.wait(0.1)
+    assert driven(port, "X", "party")[0].position() == before
+    assert cell.now < 20 * 10**9
+
+
+def test_a_daisy_chain_gets_its_names_and_then_is_a_party_line() -> None:
+    _, port = three(party=False, kind='kind = "daisy-chain"\n')
+    a, b, c, d = driven(port, "ABCD", "daisy", "A")
+    b.move_to(100)  # names are given first
+    b.wait()
+    assert [unit.position() for unit in (a, b, c)] == [0, 100, 0]
+    with pytest.raises(NoAnswer, match="is not in the chain, whose first axis is A"):
+        d.position()
+    b.write_program(["M 1000", "L 2048 0"])
+    b.go()
+    assert (a.moving(), b.moving()) == (False, True)
+    b.stop()
+    b.wait()
+    b.abort()
+    assert a.name_chain() == ("A", "B", "C")
+    assert b.position() == 0
+
+
+def test_a_sin_10_is_scanned_once_and_spools() -> None:
+    _, port = three("sin-10", party=False)
+    x, y, z, q = driven(port, "XYZQ", "sin10")
+    x.move_to(1000)
+    y.move_by(-500)
+    z.run_at(2000)
+    assert z.moving()
+    z.stop()
+    for unit in (x, y, z):
+        unit.wait()
+    assert [unit.position() for unit in (x, y)] == [1000, -500]
+    assert x.spool(["X+1000", "Y+1000", "9W*", "XZ", "YZ"])[2:] == ["9W*", "XZ     2000", "YZ      500"]
+    assert (
+        x.read_memory(0, 40) == b"\xeb\xe9\x03\x00\x17d\x00\xed\xe8\x03\x00\x17d\x00\x1a\x00\x07\x00\x00" + b"\xff" * 21
+    )
+    x.write_program(["M 1000", "L 2048 0"])
+    x.go()
+    assert x.moving()
+    with pytest.raises(Refused, match="brings it nothing but ESC"):
+        x.stop()
+    x.halt()
+    assert not x.moving()
+    place = x.position()
+    with pytest.raises(NoAnswer, match="is not known to the adapter, which knows X, Y, Z"):
+        q.position()
+    assert x.position() == place > 2000  # nobody was reset
+    assert x.scan() == "XYZ"
+    assert x.position() == 0
+
+
+def test_a_sin_8_is_a_party_line() -> None:
+    _, port = three("sin-8", party=False)
+    (x,) = driven(port, "X", "party")
+    x.move_to(10)
+    x.wait()
+    assert x.position() == 10
+
+
+class Noisy(HostPort):
+    """Loses or damages the character number `place` that is sent, or that comes."""
+
+    place, outward, lost = -1, True, True
+
+    def write(self, data: bytes) -> int:
+        if self.outward:
+            data = self._through(data)
+        return super().write(data) if data else 0
+
+    def receive(self, timeout: float) -> bytes:
+        data = super().receive(timeout)
+        return data if self.outward else self._through(data)
+
+    def _through(self, data: bytes) -> bytes:
+        passed = b""
+        for value in data:
+            if self.place == 0:
+                passed += b"" if self.lost else bytes((value ^ 0x08,))
+            else:
+                passed += bytes((value,))
+            self.place -= 1
+        return passed
+
+
+@pytest.mark.parametrize("lost", [True, False])
+@pytest.mark.parametrize("outward", [True, False])
+@pytest.mark.parametrize("party", [True, False])
+def test_a_character_that_is_lost_or_damaged_never_makes_another_move(party: bool, outward: bool, lost: bool) -> None:
+    """Page 25: the handshake by echo finds it before the line is complete. Only behind its end a line may fail."""
+    wanted, failed = 12_345, []
+    for place in range(8):
+        if party:
+            cell = cell_of('[units.unit]\nmodel = "dcb-274"\nstraps = { PARTY = "high" }\n')
+            port = Noisy(cell)
+            unit = BlockingDcb274(Dcb274("A", mode="party"), port)
+        else:
+            cell, unit = alone(port=Noisy)
+            port = unit.port
+        unit.connect()
+        port.outward, port.lost, port.place = outward, lost, place
+        try:
+            unit.command(f"R{wanted}")
+        except (NoAnswer, Refused):
+            failed.append(place)
+        unit.wait()
+        assert unit.position() in ((0, wanted) if place in failed else (wanted,))
+    assert all(place >= 6 for place in failed)  # R, five figures: what is behind them ends the line
+
+
+class Interrupted(HostPort):
+    """The user presses ^C when the write number `left` of a figure is due."""
+
+    left = 0
+
+    def write(self, data: bytes) -> int:
+        self.left -= data.isdigit()
+        if self.left == 0 and data.isdigit():
+            raise KeyboardInterrupt
+        return super().write(data)
+
+
+@pytest.mark.parametrize("party", [True, False])
+def test_a_stop_behind_a_call_that_was_interrupted_in_the_middle_of_its_line_is_a_stop(party: bool) -> None:
+    """Half a line stands in the unit then: @ behind it would be no command, and a LF would carry it out (page 25)."""
+    cell, unit = alone('straps = { PARTY = "high" }\n' * party, port=Interrupted)
+    if party:
+        unit = BlockingDcb274(Dcb274("A", mode="party"), unit.port)
+    unit.run_at(1000)
+    unit.port.left = 3
+    with pytest.raises(KeyboardInterrupt):
+        unit.command("R123456")
+    unit.stop()
+    unit.wait(timeout=5)
+    assert 0 < unit.position() < 5000
+    assert cell.controllers()["unit"].status(cell.now).state == "ready"
+
+
+class Unplugged(HostPort):
+    """Is gone at the write number `left` of a backslash, and there again then."""
+
+    left = 0
+
+    def write(self, data: bytes) -> int:
+        self.left -= data == b"\\"
+        if self.left == 0 and data == b"\\":
+            raise OSError(5, "Input/output error")
+        return super().write(data)
+
+
+@pytest.fixture(scope="module")
+def backup() -> dict[str, object]:
+    """Of a unit with a program, settings and a name of its own."""
+    _, unit = alone()
+    unit.sign_on("Q")
+    unit.write_program(["O 0", "R 400", "P 1600", "A 8"])
+    unit.set_speeds(Speeds(300, 9000, 0.2))
+    unit.currents(20, 60)
+    unit.save()
+    return unit.saved()
+
+
+def test_a_backup_has_what_the_unit_keeps_as_text_too(backup: dict[str, object]) -> None:
+    memory, parameters = backup["memory"], backup["parameters"]
+    assert isinstance(memory, list)
+    assert len(memory) == 128
+    assert memory[0].startswith("0f 00 00 00")  # O: the letter's code less 40h
+    assert backup["program"] == ["P 0", "O 0", "R 400", "P 10", "@", "W 100", "Z 0", "G 0 0", "P 1600", "A 8"]
+    assert isinstance(parameters, dict)
+    assert {key: parameters[key] for key in ("name", "divide", "initial_velocity", "slew_velocity", "decay")} == {
+        "name": "Q", "divide": 1, "initial_velocity": 300, "slew_velocity": 9572, "decay": 30,
+    }  # fmt: skip
+
+
+def test_a_backup_is_restored_to_a_new_unit_with_what_differs_only(backup: dict[str, object]) -> None:
+    cell, unit = alone()
+    steps: list[Progress] = []
+    unit.watch = steps.append
+    told = unit.restore(backup)
+    assert told[0].startswith("programs: wrote ")
+    assert "settings: loaded from NV memory (C 0)" in told
+    assert steps[-1].done == steps[-1].total
+    assert unit.saved() == backup
+    assert unit.examine().name == "Q"
+    writes = cell.controllers()["unit"].memory.writes
+    assert set(writes.values()) == {1}
+    assert len(writes) < 60
+    assert unit.restore(backup)[0] == "NV memory was as in the backup: nothing was written"
+    assert set(writes.values()) == {1}
+
+
+def test_on_a_party_line_the_name_stays_and_the_bytes_are_all_there(backup: dict[str, object]) -> None:
+    _, port = three()
+    (x,) = driven(port, "X", "party")
+    told = x.restore(backup)
+    assert told[-1] == "name: stays X, and is not Q: names are given in single mode"
+    saved = x.saved()
+    assert "program" not in saved
+    assert x.position() == 0
+    differ = [i for i, (a, b) in enumerate(zip(saved["memory"], backup["memory"], strict=True)) if a != b]  # type: ignore[call-overload]
+    assert differ == [247 // 16]
+
+
+def test_a_restore_that_fails_half_way_says_what_is_where_and_keeps_what_was(backup: dict[str, object]) -> None:
+    _, unit = alone(port=Unplugged)
+    before = unit.saved()["memory"]
+    unit.port.left = 6
+    with pytest.raises(
+        HalfWritten, match=r"of \d+ bytes that differ 5 are new, at .*: restore again to go on"
+    ) as caught:
+        unit.restore(backup)
+    assert hex_lines(caught.value.before) == before
+    assert unit.restore(backup)
+    assert unit.saved() == backup
+
+
+def test_a_restore_that_fails_at_once_has_written_nothing(backup: dict[str, object]) -> None:
+    _, unit = alone(port=Unplugged)
+    unit.connect()
+    unit.port.left = 1
+    with pytest.raises(HalfWritten, match="nothing was written for sure; address 0 may be, the rest is as it was"):
+        unit.restore(backup)
+
+
+@pytest.mark.parametrize(
+    "call", [lambda unit: unit.move_to(1), lambda unit: unit.go(), lambda unit: unit.set_position(5)]
+)
+def test_every_call_signs_on_by_itself(call: Callable[[BlockingDcb274], object]) -> None:
+    _, unit = alone()
+    call(unit)
+    assert unit.name == "A"

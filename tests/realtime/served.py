@@ -1,0 +1,43 @@
+"""Units that are served in this process, for tests of what connects to them."""
+
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+from detent.cell.description import Description, single
+from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.service import Service
+from detent.ticks import SECOND
+
+
+def no_file(name: str) -> str:
+    raise FileNotFoundError(name)
+
+
+@contextmanager
+def served(
+    what: str | Description,
+    *,
+    straps: Mapping[str, str] | None = None,
+    options: Mapping[str, str] | None = None,
+    wanted: Sequence[Wanted] = (),
+    line_timing: bool = False,
+    pace: float = 1.0,
+) -> Iterator[Service]:
+    """A model, or a cell, that has been on for a second, served by a thread. Characters take no time unless wanted."""
+    if isinstance(what, str):
+        what = single(what, straps=dict(straps or {}), options=dict(options or {}))
+    with Service(what, no_file, wanted, line_timing=line_timing, pace=pace) as service:
+        service.cell.run_to(SECOND)
+        thread = threading.Thread(target=service.run, daemon=True)
+        thread.start()
+        try:
+            yield service
+        finally:
+            service.stop()
+            thread.join(60)
+
+
+def address(service: Service) -> str:
+    """Where its first line is connected to."""
+    return service.endpoints[0].address
