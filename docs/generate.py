@@ -16,6 +16,7 @@ from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import single
 from detent.cell.parts import PARTS as CELL_PARTS
+from detent.cli.control import usage
 from detent.cli.models import reference
 from detent.controllers import catalogue
 from detent.controllers.genstepper import commands as genstepper_commands
@@ -29,6 +30,7 @@ from detent.pins import LOW, PinDriver
 from detent.ramps.differences import PAPER
 from detent.ramps.rate_generator import CLOCK_HZ
 from detent.ramps.short_movements import Way, choose, movement
+from detent.realtime import verbs
 from detent.ticks import show_duration
 
 DOCS: Final = Path(__file__).parent
@@ -329,6 +331,37 @@ def board_memory() -> str:
     return table(("address", "what"), genstepper_commands.MEMORY)
 
 
+# -- from the table of verbs of a cell that is served -----------------------------------------------------------
+
+
+def verb_table() -> str:
+    """Every verb as it is typed, with its method over HTTP."""
+    rows = [
+        (f"`{verb.name}`", f"`{usage(verb)}`" if verb.parameters else "", "POST" if verb.changes else "GET", verb.help)
+        for verb in verbs.VERBS.values()
+    ]
+    return table(("verb", "arguments of `detent control`", "HTTP", "what"), rows)
+
+
+def verb_arguments() -> str:
+    """Every argument of every verb."""
+    rows = [
+        (f"`{verb.name}`", f"`{p.name}`" if p.required else f"[`{p.name}`]", p.kind.takes, p.help)
+        for verb in verbs.VERBS.values()
+        for p in verb.parameters
+    ]
+    return table(("verb", "argument", "takes", "what"), rows)
+
+
+def fault_table() -> str:
+    """Every kind of fault."""
+    rows = [
+        (f"`{kind.name}`", kind.where, ", ".join(f"`{name}`" for name in (*kind.takes, "for")), kind.help)
+        for kind in verbs.FAULTS.values()
+    ]
+    return table(("kind", "where", "arguments", "what"), rows)
+
+
 PARTS: Final[dict[str, Callable[[], str]]] = {
     "addresses": addresses,
     "baud rates": rates,
@@ -358,6 +391,9 @@ PARTS: Final[dict[str, Callable[[], str]]] = {
     "reports of the boards": board_reports,
     "step actions of the boards": board_actions,
     "memory of the boards": board_memory,
+    "verbs": verb_table,
+    "verb arguments": verb_arguments,
+    "faults": fault_table,
 }
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from detent.ticks import NEVER, SECOND
-from detent.uart import Char, Format, Sent, Transmitter
+from detent.uart import Char, Format, Receiver, Sent, Transmitter, break_as, heard_as
 
 GS_C200 = Format(9600, 7, "odd", 2)
 
@@ -139,3 +139,145 @@ def test_the_format_changes_between_characters_only() -> None:
     sender.advance(NEVER - 1)
     assert out[-1].at == 1_145_833
     assert out[-1].done == 1_145_833 + 9_166_667
+
+
+FORMATS = st.builds(
+    Format,
+    st.sampled_from([110, 300, 1200, 2400, 4800, 9600, 19200, 115200]),
+    st.sampled_from([7, 8]),
+    st.sampled_from(["none", "odd", "even", "mark", "space"]),
+    st.sampled_from([1, 2]),
+)
+
+
+def as_wide_as(form: Format, data: bytes) -> bytes:
+    return bytes(value & ((1 << form.data_bits) - 1) for value in data)
+
+
+@given(FORMATS, st.binary(max_size=20))
+def test_a_receiver_in_the_senders_format_hears_what_was_sent(form: Format, data: bytes) -> None:
+    assert heard_as(data, form, form) == [Char(value) for value in as_wide_as(form, data)]
+
+
+@given(FORMATS, st.integers(-4, 4), st.binary(max_size=20))
+def test_a_clock_that_is_wrong_by_four_percent_is_good_enough_and_no_error_adds_up(
+    form: Format, percent: int, data: bytes
+) -> None:
+    """A receiver starts anew with every start bit: half a bit in at most twelve may be missing."""
+    near = form._replace(baud=form.baud * (100 + percent))
+    exact = form._replace(baud=form.baud * 100)
+    assert heard_as(data, exact, near) == [Char(value) for value in as_wide_as(form, data)]
+
+
+@pytest.mark.parametrize("stop_bits", [1, 2])
+def test_a_receiver_looks_at_the_first_stop_bit_alone(stop_bits: int) -> None:
+    sent, read = Format(9600, 8, "none", stop_bits), Format(9600, 8, "none", 3 - stop_bits)
+    assert heard_as(b"V1\r\xff\0", sent, read) == [Char(value) for value in b"V1\r\xff\0"]
+
+
+def test_the_parity_bit_is_an_eighth_data_bit_to_who_expects_one() -> None:
+    """GS-C200 datasheet, "Communication port characteristics": 7 data bits, odd parity."""
+    assert heard_as(b"F\r", GS_C200, Format(9600)) == [Char(0x46), Char(0x0D)], "three ones each: a parity bit of 0"
+    assert heard_as(b"Y1", GS_C200, Format(9600)) == [Char(0xD9), Char(0x31)], "four ones need a fifth"
+
+
+def test_an_eighth_data_bit_is_a_parity_bit_to_who_expects_one() -> None:
+    assert heard_as(b"FY", Format(9600), GS_C200) == [Char(ord("F")), Char(ord("Y"), parity_ok=False)]
+
+
+def test_the_wrong_parity_is_noticed_in_every_character() -> None:
+    even = Format(9600, 7, "even", 2)
+    assert heard_as(b"V1\r", even, GS_C200) == [Char(value, parity_ok=False) for value in b"V1\r"]
+    spoilt = [Char(value, parity_ok=False) for value in b"V1\r"]
+    assert heard_as(spoilt, even, GS_C200) == [Char(value) for value in b"V1\r"], "two wrongs"
+
+
+def test_a_receiver_twice_as_fast_sees_every_bit_twice_and_falls_over_the_stop_bit() -> None:
+    # start 0, U is 1 0 1 0 1 0 1 0, stop 1; at twice the rate 0 01100110 0, high, 0 01100111 1
+    assert heard_as(b"U", Format(4800), Format(9600)) == [
+        Char(0b01100110, framing_ok=False),
+        Char(0b11100110),
+    ]
+
+
+def test_a_receiver_half_as_fast_takes_two_characters_for_one() -> None:
+    # \0 at 9600 is 9 bits low and 1 high: at 4800 a start bit, then what lies in the middle of every second bit
+    assert heard_as(b"\0", Format(9600), Format(4800)) == [Char(0b11111000)]
+    assert heard_as(b"\0\0", Format(9600), Format(4800)) == [Char(0b00001000)]
+
+
+def test_a_glitch_shorter_than_half_a_bit_is_no_start_bit() -> None:
+    assert heard_as(b"\xff", Format(9600), Format(1200)) == []
+
+
+def test_a_character_without_a_stop_bit_is_marked_and_the_next_begins_when_the_line_has_risen() -> None:
+    damaged = [Char(0x41, framing_ok=False), Char(0x55)]
+    form = Format(9600)
+    assert heard_as(damaged[:1], form, form) == damaged[:1]
+    assert heard_as(damaged, form, form)[0] == damaged[0]
+    assert heard_as(damaged, form, form)[1:] != damaged[1:], "its start bit did not fall"
+
+
+@given(FORMATS, FORMATS, st.binary(min_size=1, max_size=12), st.integers(0, 12))
+def test_what_is_heard_does_not_depend_on_how_a_burst_is_sliced(
+    sent: Format, read: Format, data: bytes, cut: int
+) -> None:
+    receiver = Receiver(sent, read)
+    heard = receiver.hear(data[:cut]) + receiver.hear(data[cut:]) + receiver.idle()
+    assert heard == heard_as(data, sent, read)
+    singly = [char for value in data for char in receiver.hear(bytes((value,)))] + receiver.idle()
+    assert singly == heard
+
+
+@given(FORMATS, FORMATS, st.binary(max_size=8))
+def test_a_receiver_is_at_rest_after_an_idle_line(sent: Format, read: Format, data: bytes) -> None:
+    receiver = Receiver(sent, read)
+    first = receiver.hear(data) + receiver.idle()
+    assert receiver.hear(data) + receiver.idle() == first
+
+
+@given(FORMATS, FORMATS, st.binary(max_size=8))
+def test_what_is_heard_is_what_a_drawn_line_shows(sent: Format, read: Format, data: bytes) -> None:
+    """The same with fractions of a second and a line drawn bit by bit."""
+    edges: list[int] = []
+    for value in as_wide_as(sent, data):
+        bits = [value >> bit & 1 for bit in range(sent.data_bits)]
+        parity = {"odd": [1 - sum(bits) % 2], "even": [sum(bits) % 2], "mark": [1], "space": [0]}.get(sent.parity, [])
+        edges += [0, *bits, *parity, *[1] * sent.stop_bits]
+
+    def level(at: Fraction) -> int:
+        bit = at * sent.baud // 1
+        return edges[bit] if 0 <= bit < len(edges) else 1
+
+    falls = [bit for bit in range(len(edges)) if not edges[bit] and (bit == 0 or edges[bit - 1])]
+    looks, heard = Fraction(-1), []
+    count = 1 + read.data_bits + (read.parity != "none")
+    for fall in falls:
+        at = Fraction(fall, sent.baud)
+        if at <= looks:
+            continue
+        looks = at + Fraction(1, 2 * read.baud)
+        if level(looks):
+            continue
+        seen = [level(at + Fraction(2 * bit + 1, 2 * read.baud)) for bit in range(1, count + 1)]
+        looks = at + Fraction(2 * count + 1, 2 * read.baud)
+        value = sum(one << bit for bit, one in enumerate(seen[: read.data_bits]))
+        right = {"odd": 1 - value.bit_count() % 2, "even": value.bit_count() % 2, "mark": 1, "space": 0}
+        parity_ok = read.parity == "none" or seen[read.data_bits] == right[read.parity]
+        heard.append(Char(value, parity_ok, bool(seen[-1])))
+    assert heard_as(data, sent, read) == heard
+
+
+def test_a_break_is_a_zero_without_a_stop_bit() -> None:
+    assert break_as(Format(9600)) == Char(0, framing_ok=False)
+    assert break_as(GS_C200) == Char(0, parity_ok=False, framing_ok=False)
+    assert break_as(Format(9600, 7, "even")) == Char(0, framing_ok=False)
+
+
+def test_damaged_characters_are_sent_as_they_are() -> None:
+    out: list[Sent] = []
+    sender = Transmitter("TXD", GS_C200, out)
+    damaged = (Char(65, parity_ok=False), Char(66, framing_ok=False))
+    sender.send(damaged, 0)
+    sender.advance(NEVER - 1)
+    assert tuple(item.char for item in out) == damaged

@@ -5,8 +5,9 @@ character of a burst ends at the burst's start plus k characters, rounded once.
 """
 
 from collections import deque
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 from detent.ticks import NEVER, SECOND, Ns, round_ratio
 
@@ -22,9 +23,17 @@ class Char(NamedTuple):
 SOUND = tuple(Char(value) for value in range(256))
 """Every undamaged character, made once."""
 
+Chars: TypeAlias = bytes | Sequence[Char]
+"""Characters in a row; bytes are undamaged ones."""
+
+
+def characters(data: Chars) -> Sequence[Char]:
+    """`data` as characters, one by one."""
+    return [SOUND[value] for value in data] if isinstance(data, bytes) else data
+
 
 class Format(NamedTuple):
-    """One start bit, then `data_bits`, `parity` ('none', 'odd', 'even'), `stop_bits`, at `baud` bits a second."""
+    """One start bit, `data_bits`, `parity` (none, odd, even, mark, space), `stop_bits`, at `baud` bits a second."""
 
     baud: int
     data_bits: int = 8
@@ -43,6 +52,103 @@ class Format(NamedTuple):
     def __str__(self) -> str:
         """Like ``9600 7O2``."""
         return f"{self.baud} {self.data_bits}{self.parity[0].upper()}{self.stop_bits}"
+
+
+def break_as(read: Format) -> Char:
+    """What a receiver makes of a line that is held at 0 for longer than a character."""
+    return Char(0, _parity_bit(0, read.parity) == 0, framing_ok=False)
+
+
+class Receiver:
+    """What a receiver in the format `read` makes of characters that are sent in another, by the bits on the wire.
+
+    A character begins where the line falls, if it is still low half a bit later. Each bit is looked at in its middle,
+    by the receiver's clock; of the stop bits the first alone. From there on the next character may begin: behind a
+    stop bit that is low, when the line has risen.
+    """
+
+    __slots__ = ("_at", "_half", "_levels", "_read", "_sent", "_width")
+
+    def __init__(self, sent: Format, read: Format) -> None:
+        self._sent, self._read = sent, read
+        # times are counted in units of which a bit of either side has an even number
+        self._width = 2 * read.baud  # of a bit sent
+        self._half = sent.baud  # of half a bit read
+        self._levels = [1]  # of the bits that may still matter, one that was high before them
+        self._at = 0  # where the receiver looks, from their begin
+
+    def hear(self, chars: Chars) -> list[Char]:
+        """`chars` follow on the line without a pause: the characters that are decided by them."""
+        for char in characters(chars):
+            self._levels += _bits(char, self._sent)
+        heard = self._decide(len(self._levels) * self._width)
+        passed = self._at // self._width
+        del self._levels[:passed]
+        self._at -= passed * self._width
+        return heard
+
+    def idle(self) -> list[Char]:
+        """The line is high for a while now: what was begun ends so."""
+        heard = self._decide(None)
+        self._levels, self._at = [1], 0
+        return heard
+
+    def _decide(self, until: int | None) -> list[Char]:
+        """The characters that begin behind `_at` and end before `until`; None: the line is high for ever."""
+        data_bits, parity = self._read.data_bits, self._read.parity
+        stop = 1 + data_bits + (parity != "none")
+        heard: list[Char] = []
+        while (edge := self._falls()) is not None:
+            if until is not None and edge + (2 * stop + 1) * self._half >= until:
+                break
+            start, *bits = (self._level(edge + (2 * bit + 1) * self._half) for bit in range(stop + 1))
+            if start:  # too short for a start bit
+                self._at = edge + self._half
+                continue
+            value = sum(level << bit for bit, level in enumerate(bits[:data_bits]))
+            parity_ok = parity == "none" or bits[data_bits] == _parity_bit(value, parity)
+            heard.append(Char(value, parity_ok, framing_ok=bool(bits[-1])))
+            self._at = edge + (2 * stop + 1) * self._half
+        return heard
+
+    def _falls(self) -> int | None:
+        """When the line next falls."""
+        high = False
+        for bit in range(self._at // self._width, len(self._levels)):
+            if high and not self._levels[bit]:
+                return bit * self._width
+            high = bool(self._levels[bit])
+        return None
+
+    def _level(self, at: int) -> int:
+        bit = at // self._width
+        return self._levels[bit] if bit < len(self._levels) else 1
+
+
+def heard_as(chars: Chars, sent: Format, read: Format) -> list[Char]:
+    """What a receiver in the format `read` makes of `chars`, sent in the format `sent` in one go on an idle line."""
+    receiver = Receiver(sent, read)
+    return receiver.hear(chars) + receiver.idle()
+
+
+def _bits(char: Char, form: Format) -> list[int]:
+    """The levels of a character on the wire, one a bit time."""
+    value = char.value & ((1 << form.data_bits) - 1)
+    bits = [0, *(value >> bit & 1 for bit in range(form.data_bits))]
+    if form.parity != "none":
+        bits.append(_parity_bit(value, form.parity) ^ (not char.parity_ok))
+    return [*bits, int(char.framing_ok), *[1] * (form.stop_bits - 1)]
+
+
+def _parity_bit(value: int, parity: str) -> int:
+    """The parity bit behind `value`; 0 where there is none."""
+    match parity:
+        case "odd":
+            return 1 - value.bit_count() % 2
+        case "even":
+            return value.bit_count() % 2
+        case _:
+            return int(parity == "mark")
 
 
 class Sent(NamedTuple):
@@ -84,26 +190,26 @@ class Transmitter:
 
     def __init__(self, port: str, form: Format, out: Outbox, *, timed: bool = True) -> None:
         self._port, self._format, self._out, self._timed = port, form, out, timed
-        self._queue: deque[int] = deque()
+        self._queue: deque[Char] = deque()
         self._burst: Ns = 0  # start of the run of characters sent without a pause
         self._index = 0  # of the next character in the burst
         self.busy_until: Ns = 0
         self.deadline: Ns = NEVER
 
-    def send(self, data: bytes, now: Ns) -> None:
+    def send(self, data: Chars, now: Ns) -> None:
         """Queue characters behind those that wait already; the first starts at once on an idle line."""
         if not data:
             return
         if not self._timed:
-            for value in data:
-                self._out.append(Sent(now, self._port, SOUND[value], now))
+            for char in characters(data):
+                self._out.append(Sent(now, self._port, char, now))
             self.busy_until = now
             return
         if not self._queue:
             if self.busy_until <= now:
                 self._burst, self._index = now, 0
             self.deadline = max(now, self.busy_until)
-        self._queue.extend(data)
+        self._queue.extend(characters(data))
         self.busy_until = self._burst + self._format.duration(self._index + len(self._queue))
         self.advance(now)
 
@@ -125,5 +231,5 @@ class Transmitter:
             start = self.deadline
             self._index += 1
             done = self._burst + self._format.duration(self._index)
-            self._out.append(Sent(start, self._port, SOUND[self._queue.popleft()], done))
+            self._out.append(Sent(start, self._port, self._queue.popleft(), done))
             self.deadline = done if self._queue else NEVER

@@ -3,10 +3,13 @@
 import pytest
 from tests.cell.cells import cell, edges, pulses
 
+from detent.cell.build import build
 from detent.cell.cell import Oscillation
+from detent.cell.description import single
 from detent.cell.recording import InputSet, Received
 from detent.controllers.device import Powered, StoreImage
 from detent.ticks import MS, SECOND, US
+from detent.uart import Char
 
 ONE = '[units.unit]\nmodel = "gs-c200s"\nstraps = {CHS = 0}\n'
 TWO = ONE.replace("unit]", "first]") + ONE.replace("unit]", "second]")
@@ -289,3 +292,17 @@ def test_multipoint_units_share_their_line() -> None:
     assert say(made, "u5", "V1") == ["V5"]
     assert len(made.lines) == 1
     assert made.wiring.line_names == ("bus",)
+
+
+def test_damaged_characters_of_a_host_reach_the_unit_so_and_are_replayed() -> None:
+    damaged = [Char(ord("F"), parity_ok=False), Char(13)]
+    made = build(single("gs-c200"), lambda file: "")
+    made.send(0, damaged)
+    made.run_to(100 * MS)
+    assert made.recording is not None
+    heard = [entry.char for entry in made.recording.of("gs-c200") if isinstance(entry, Received)]
+    assert heard == damaged
+    again = build(single("gs-c200"), lambda file: "", journal=made.journal)
+    again.run_to(100 * MS)
+    assert again.recording is not None
+    assert list(again.recording) == list(made.recording)

@@ -100,7 +100,7 @@ def test_two_processes_do_not_share_images(tmp_path: Path) -> None:
 
 
 def test_people_are_told_what_is_served_and_how_to_connect(tmp_path: Path) -> None:
-    served = start("gs-c200", "--pty", "--tcp", ":0", "--state", tmp_path, "--strap", "BR0=high")
+    served = start("gs-c200", "--pty", "--tcp", ":0", "--rfc2217", ":0", "--state", tmp_path, "--strap", "BR0=high")
     assert served.stdout is not None
     lines = []
     while not lines or "Ctrl-C" not in lines[-1]:
@@ -110,6 +110,10 @@ def test_people_are_told_what_is_served_and_how_to_connect(tmp_path: Path) -> No
     assert re.search(r"^  gs-c200: gs-c200, straps .*\bBR0=1\b", text, re.M)
     assert re.search(r"^  gs-c200  picocom --baud 4800 /dev/\S+ +# pseudo-terminal, 4800 7O2$", text, re.M)
     assert re.search(r"; nc 127\.0\.0\.1 \d+; .*# TCP 127\.0\.0\.1:\d+, 4800 7O2$", text, re.M)
+    url = r"rfc2217://127\.0\.0\.1:\d+"
+    assert re.search(
+        rf'  serial\.serial_for_url\("{url}", 4800, 7, "O", 2\) +# RFC 2217 \(pyserial\), 4800 7O2$', text, re.M
+    )
     out, err = end(served)
     assert re.fullmatch(r"Ended after \S+ s: .*deadlines.*\.\n", out)
     assert err == ""

@@ -7,7 +7,7 @@ from random import Random
 from detent.lines.line import Heard
 from detent.realtime.pace import WallNs
 from detent.ticks import US, Ns
-from detent.uart import Char
+from detent.uart import Chars, characters
 
 LOOK = 30 * US  # what a look at the descriptors costs
 
@@ -50,7 +50,7 @@ class TickingCell:
         self.lines = [TickingLine() for _ in range(lines)]
         self.period = period
         self.ticks = 0
-        self.sent: list[tuple[Ns, int, bytes]] = []
+        self.sent: list[tuple[Ns, int, Chars]] = []
 
     def next_event(self) -> Ns | None:
         return None if self.period is None else (self.ticks + 1) * self.period
@@ -62,15 +62,15 @@ class TickingCell:
             self.ticks += 1
             self.say(0, b"t", at)
 
-    def send(self, line: int, data: bytes) -> None:
+    def send(self, line: int, data: Chars) -> None:
         self.sent.append((self.now, line, data))
         self.say(line, data, self.now)
 
-    def say(self, line: int, data: bytes, at: Ns) -> None:
-        self.lines[line].heard += [Heard(at, Char(value)) for value in data]
+    def say(self, line: int, data: Chars, at: Ns) -> None:
+        self.lines[line].heard += [Heard(at, char) for char in characters(data)]
 
     def got(self, line: int = 0) -> bytes:
-        return b"".join(data for _, on, data in self.sent if on == line)
+        return b"".join(bytes(char.value for char in characters(data)) for _, on, data in self.sent if on == line)
 
 
 class Client:

@@ -85,7 +85,7 @@ class _Builder:
                     [self.line(name, units, line_timing) for name, units in lines.items()],
                     [*actions, *journal], store=store, record=record)  # fmt: skip
         self.switch_on(cell, images)
-        cell.journaling = record
+        cell.begin(journaling=record)
         return cell
 
     # -- units -------------------------------------------------------------------------------------------

@@ -7,18 +7,33 @@ order they were made and never merged; what a round causes is delivered in the n
 """
 
 import copy
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.deeds import Action, Power, Send, SetPin, SetSwitch, Start
+from detent.cell.breakage import Fault, Faults, find_pin
+from detent.cell.deeds import (
+    Action,
+    Break,
+    Deed,
+    Load,
+    Mend,
+    PlaceSwitch,
+    Power,
+    Release,
+    Send,
+    SetPin,
+    SetSwitch,
+    Start,
+)
 from detent.cell.recording import InputSet, Log, Received, Recording
 from detent.controllers.device import Controller, Device, DriveSet, Output, Powered, StageSet, StoreImage
 from detent.lines.line import EVERYBODY, Line
-from detent.pins import HIGH, LOW, Level, Net, PinSet
+from detent.pins import HIGH, LOW, Level, Net, PinKind, PinSet
 from detent.ticks import NEVER, Ns
-from detent.uart import Sent
+from detent.uart import Chars, Sent
 
 MOST_DELIVERIES = 1_000
 
@@ -112,16 +127,23 @@ class Cell:
         self._outside = Outside(store)
         self.recording: Recording | None = Recording(wiring.names[: wiring.units]) if record else None
         self.journal: Log[Action] = Log()  # what was done from outside, if the cell records: see `replay`
-        self.journaling = False  # from the moment on when the cell is built
+        self.journaling = False  # see `begin`
         self._script = Script(sorted(script, key=lambda action: action.at))
         self._next_action = 0
-        self._acting = False  # the script is doing it
+        self._acting = True  # it is being built, or the script is doing it
+        self.faults = Faults()
+        self._hands: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
+        self._supplied: set[int] = set()  # units that are switched on
         self._deadlines: list[Ns] = [NEVER] * len(parts)
         self._line_deadline: Ns = NEVER  # the earliest of all lines
         self._script_deadline: Ns = self._script[0].at if self._script else NEVER
         self._touched: set[int] = set()
         self._instant: Ns = -1
         self._deliveries: Counter[str] = Counter()  # of this instant, by pin
+
+    def begin(self, *, journaling: bool) -> None:
+        """It is built: what is done to it from now on comes from outside. Its journal has all of it, or nothing."""
+        self._acting, self.journaling = False, journaling
 
     # -- time --------------------------------------------------------------------------------------------
 
@@ -174,10 +196,11 @@ class Cell:
 
     # -- what the outside does ---------------------------------------------------------------------------
 
-    def send(self, line: int, data: bytes) -> None:
-        """The host of a line sends `data`, now."""
-        if self.journaling and not self._acting:
-            self.journal.append(Action(self.now, Send(line, data)))
+    def send(self, line: int, data: Chars) -> None:
+        """The host of a line sends `data`, now; characters may be damaged already."""
+        if not self._acting:
+            self._catch_up()
+            self._keep(Send(line, data if isinstance(data, bytes) else tuple(data)))
         chars = self.lines[line].immediate(data)
         if chars:  # nothing waits on such a line: what is sent is heard
             for unit, port in self.wiring.lines[line]:
@@ -200,16 +223,39 @@ class Cell:
         self.send(line, self.talker(unit).frame(text))
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:
-        """Drive an input pin from outside, now: a hand with a wire. Other drivers of its net are not asked."""
-        if self.journaling and not self._acting:
-            self.journal.append(Action(self.now, SetPin(unit, pin, level)))
-        self._set_pin(self.unit(unit), pin, level)
-        self._settle()
+        """Drive an input pin from outside, now: a hand with a wire. Other drivers of its net are not asked.
+
+        It stays so until the wire changes, or `release`.
+        """
+        index = self.unit(unit)
+        if not self._acting:
+            self._catch_up()
+            self._keep(SetPin(unit, pin, level))
+        self._hands[index, pin] = level
+        if not self.faults.holds(index, pin):
+            self.give(index, pin, level)
+
+    def release(self, unit: str, pin: str) -> None:
+        """Leave an input that was driven from outside to its wire again, now; without a wire it rests.
+
+        Raises ValueError for a strap without a wire: how it was tied is not known here.
+        """
+        index = self.unit(unit)
+        found = find_pin(self.parts[index].pins, pin)
+        if found is not None and found.kind is PinKind.STRAP and self.net_read(index, pin) is None:
+            raise ValueError(f"{unit}.{pin} is a strap: set it to the level that it is tied to")
+        if not self._acting:
+            self._catch_up()
+            self._keep(Release(unit, pin))
+        self._hands.pop((index, pin), None)
+        if not self.faults.holds(index, pin):
+            self.give(index, pin, self.given(index, pin))
 
     def set_switch(self, name: str, level: Level) -> None:
         """Put a switch of the cell to `level`, now."""
-        if self.journaling and not self._acting:
-            self.journal.append(Action(self.now, SetSwitch(name, level)))
+        if not self._acting:
+            self._catch_up()
+            self._keep(SetSwitch(name, level))
         index = self.wiring.names.index(name, self.wiring.units)
         self.parts[index].set_pin("SET", level, self.now)
         self._touched.add(index)
@@ -217,12 +263,11 @@ class Cell:
 
     def power(self, unit: str, on: bool) -> None:
         """Switch the supply of a unit, now."""
-        if self.journaling and not self._acting:
-            self.journal.append(Action(self.now, Power(unit, on)))
         index = self.unit(unit)
-        self.parts[index].power(on, self.now)
-        self._touched.add(index)
-        self._settle()
+        if not self._acting:
+            self._catch_up()
+            self._keep(Power(unit, on))
+        self.supply(index, on)
 
     def switch_on(self, part: int) -> None:
         """Let a part that is no unit (a contact) tell its level, now."""
@@ -230,15 +275,143 @@ class Cell:
         self._touched.add(part)
         self._settle()
 
+    def load(self, unit: str, image: bytes, base: int) -> None:
+        """Put a program into the unit's memory from address `base` on, now. Raises ImageError."""
+        if not self._acting:
+            self._catch_up()
+        self.controller(unit).load(image, base, self.now)
+        self._keep(Load(unit, image, base))
+        self._touched.add(self.unit(unit))
+        self._settle()
+
+    def place_switch(self, name: str, low: float | None, high: float | None) -> None:
+        """Put a switch elsewhere on its axis, now: places as in a cell file. Raises KeyError, ValueError."""
+        index = self._part_with_contact(name)
+        if not self._acting:
+            self._catch_up()
+        self.parts[index].move_contact(name, low, high, self.now)  # type: ignore[attr-defined]
+        self._keep(PlaceSwitch(name, low, high))
+        self._touched.add(index)
+        self._settle()
+
     def start(self, unit: str) -> None:
         """Start the program in the unit's memory, now."""
-        if self.journaling and not self._acting:
-            self.journal.append(Action(self.now, Start(unit)))
+        if not self._acting:
+            self._catch_up()
+            self._keep(Start(unit))
         self.controller(unit).start(self.now)
         self._touched.add(self.unit(unit))
         self._settle()
 
+    def breaks(self, fault: Fault, lasting: Ns | None = None) -> int:
+        """Something breaks, now, for a time or until `mend`; the number of the fault.
+
+        Raises ValueError or KeyError, with a remedy, for what cannot break so.
+        """
+        if not self._acting:
+            self._catch_up()
+        number = self.faults.begin(self, fault, lasting)
+        if lasting is not None:
+            self._schedule(Action(self.now + lasting, Mend(number)))
+        self._keep(Break(fault, lasting))
+        return number
+
+    def mend(self, fault: int) -> None:
+        """The fault of this number is mended, now, if it is not already. Raises KeyError for a number never given."""
+        if not self._acting:
+            self._catch_up()
+        self.faults.mend(self, fault)
+        self._keep(Mend(fault))
+
+    def _keep(self, deed: Deed) -> None:
+        """Note what is done from outside; it is done when everything else of this instant has happened."""
+        if self.journaling and not self._acting:
+            self.journal.append(Action(self.now, deed, True))
+
+    def _schedule(self, action: Action) -> None:
+        """Put an action that is to come into the script, before those of the same time."""
+        left = self._script[self._next_action :]
+        place = bisect_left(left, action.at, key=lambda other: other.at)
+        self._script, self._next_action = Script((*left[:place], action, *left[place:])), 0
+        self._script_deadline = self._script[0].at
+
+    # -- what faults do to it ----------------------------------------------------------------------------
+
+    def supply(self, part: int, on: bool) -> None:
+        """Switch the supply of a unit, now."""
+        if on:
+            self._supplied.add(part)
+        else:
+            self._supplied.discard(part)
+        self.parts[part].power(on, self.now)
+        self._touched.add(part)
+        if on:
+            self._match_line(self.wiring.line_of[part])
+        self._settle()
+
+    def supplied(self, part: int) -> bool:
+        """Whether a unit is switched on."""
+        return part in self._supplied
+
+    def give(self, part: int, pin: str, level: Level) -> None:
+        """Give an input a level, now."""
+        self._set_pin(part, pin, level)
+        self._settle()
+
+    def given(self, part: int, pin: str) -> Level:
+        """The level that an input is given by its wire; without a wire, by a hand; else its level at rest."""
+        net = self.net_read(part, pin)
+        if net is not None:
+            return self.nets[net].level
+        found = find_pin(self.parts[part].pins, pin)
+        return self._hands.get((part, pin), HIGH if found is None else found.rest)
+
+    def drive(self, net: int, driver: tuple[int, str], level: Level) -> None:
+        """Put a level on a net, now."""
+        self._drive(net, driver, level)
+        self._settle()
+
+    def net_driven(self, part: int, pin: str) -> int | None:
+        """The net that an output drives, if a wire leads from it."""
+        return self.wiring.drives[part].get(pin)
+
+    def net_read(self, part: int, pin: str) -> int | None:
+        """The net that an input is wired to, stuck or not."""
+        reader = part, pin
+        for net, readers in enumerate(self.wiring.reads):
+            if reader in readers or reader in self.faults.readers(net):
+                return net
+        return None
+
+    def spare_net(self) -> int:
+        """A new net, to which nothing is joined."""
+        self.nets.append(Net())
+        self.wiring = self.wiring._replace(reads=(*self.wiring.reads, ()))
+        return len(self.nets) - 1
+
+    def lead(self, part: int, pin: str, net: int) -> None:
+        """Let an output that drives a net drive another one."""
+        drives = list(self.wiring.drives)
+        drives[part] = {**drives[part], pin: net}
+        self.wiring = self.wiring._replace(drives=tuple(drives))
+
+    def listen(self, net: int, pins: Sequence[tuple[int, str]]) -> None:
+        """Let these inputs, and no others, read a net."""
+        reads = list(self.wiring.reads)
+        reads[net] = tuple(pins)
+        self.wiring = self.wiring._replace(reads=tuple(reads))
+
+    def exchange(self, line: int, other: Line) -> None:
+        """Put another line in the place of a line."""
+        self.lines[line] = other
+        self._plan_lines()
+
     # -- looking -----------------------------------------------------------------------------------------
+
+    @property
+    def hands(self) -> Mapping[tuple[int, str], Level]:
+        """The inputs that are given a level from outside, by unit and pin."""
+        return self._hands
 
     def unit(self, name: str) -> int:
         """The index of a unit. Raises KeyError."""
@@ -324,7 +497,8 @@ class Cell:
                     self.parts[follower].heed(item)  # type: ignore[attr-defined]
                     self._touched.add(follower)
             elif kind is StoreImage:
-                ok = self._outside.store(self.wiring.names[index], item.image)  # type: ignore[union-attr]
+                name = self.wiring.names[index]
+                ok = self.faults.writable(name) and self._outside.store(name, item.image)  # type: ignore[union-attr]
                 self.parts[index].stored(ok, self.now)
                 self._touched.add(index)
             elif kind is Powered:
@@ -357,6 +531,25 @@ class Cell:
             self.recording.extend(index, (InputSet(self.now, pin, level),))
         self.parts[index].set_pin(pin, level, self.now)
         self._touched.add(index)
+
+    def _match_line(self, number: int) -> None:
+        """The host of a line speaks as all its units are strapped to hear, from the moment one is switched on."""
+        if number < 0:
+            return
+        line = self.lines[number]
+        forms = {self.parts[unit].line_format for unit, _ in self.wiring.lines[number]}  # type: ignore[attr-defined]
+        if len(forms) == 1 and line.format not in forms:
+            line.change(forms.pop())
+            self._plan_lines()
+
+    def _part_with_contact(self, name: str) -> int:
+        """The part that the switch `name` on an axis belongs to: itself, or the motor that moves it."""
+        for index in range(self.wiring.units, len(self.parts)):
+            if name in getattr(self.parts[index], "contact_names", (self.wiring.names[index],)):
+                if hasattr(self.parts[index], "move_contact"):
+                    return index
+                raise ValueError(f"switch {name!r} is on no axis: it has no place")
+        raise KeyError(f"no switch {name!r} in this cell")
 
     def _plan_lines(self) -> None:
         earliest = NEVER
@@ -399,6 +592,8 @@ class Cell:
         """Carry out the script's actions that are due."""
         while self._next_action < len(self._script) and self._script[self._next_action].at <= at:
             action = self._script[self._next_action]
+            if action.outside and (min(self._deadlines) <= at or self._line_deadline <= at):
+                return  # the rest of this instant comes before it
             self._next_action += 1
             self._acting = True
             action.deed.do(self)

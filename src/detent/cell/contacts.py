@@ -1,5 +1,6 @@
 """What a motor in a cell shows to wires: its pins, the contacts on its axis, the step detector."""
 
+from math import inf
 from typing import NamedTuple
 
 from detent.pins import HIGH, LOW, Level, Pin, PinKind
@@ -21,12 +22,39 @@ QUADRATURE = ((LOW, LOW), (HIGH, LOW), (HIGH, HIGH), (LOW, HIGH))
 
 
 class Contact(NamedTuple):
-    """A switch on the axis: at `inside` while the rotor is between `low` and `high`, in steps (or for ever)."""
+    """A switch on the axis: at `inside` while the rotor is between `low` and `high`, in steps (or for ever).
+
+    A cell file counts its places in `lead` to a step; `margin` steps are added at each end of what it says.
+    """
 
     name: str
     low: float
     high: float
     inside: Level
+    lead: float = 1.0
+    margin: float = 0.0
+
+    @property
+    def range(self) -> tuple[float | None, float | None]:
+        """Where it begins and ends, as a cell file counts; None: never."""
+        ends = ((self.low + self.margin) * self.lead, (self.high - self.margin) * self.lead)
+        low, high = min(ends), max(ends)
+        return None if low == -inf else low, None if high == inf else high
+
+    def moved(self, low: float | None, high: float | None) -> "Contact":
+        """The same contact elsewhere, as a cell file counts. ValueError if it has no width, or ends before it begins.
+
+        None: without end there.
+        """
+        if low is None and high is None:
+            raise ValueError(f"switch {self.name} needs a place: an end at least")
+        begin, end = -inf if low is None else low / self.lead, inf if high is None else high / self.lead
+        if self.lead < 0:
+            begin, end = (-inf if high is None else end), (inf if low is None else begin)
+        begin, end = begin - self.margin, end + self.margin
+        if begin >= end:
+            raise ValueError(f"switch {self.name} has no width: give from and to, in this order")
+        return self._replace(low=begin, high=end)
 
     @property
     def pin(self) -> Pin:

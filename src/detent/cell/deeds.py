@@ -2,14 +2,16 @@
 
 from typing import NamedTuple, Protocol, TypeAlias
 
+from detent.cell.breakage import Fault
 from detent.pins import Level
 from detent.ticks import Ns
+from detent.uart import Chars
 
 
 class Doer(Protocol):
     """The cell, as deeds know it."""
 
-    def send(self, line: int, data: bytes) -> None:
+    def send(self, line: int, data: Chars) -> None:
         """The host of a line sends `data`, now."""
 
     def type(self, unit: str, text: str) -> None:
@@ -21,18 +23,33 @@ class Doer(Protocol):
     def set_pin(self, unit: str, pin: str, level: Level) -> None:
         """Drive an input pin from outside, now."""
 
+    def release(self, unit: str, pin: str) -> None:
+        """Leave an input pin to its wire again, now."""
+
     def power(self, unit: str, on: bool) -> None:
         """Switch the supply of a unit, now."""
+
+    def load(self, unit: str, image: bytes, base: int) -> None:
+        """Put a program into a unit's memory, now."""
 
     def start(self, unit: str) -> None:
         """Start the program in a unit's memory, now."""
 
+    def place_switch(self, name: str, low: float | None, high: float | None) -> None:
+        """Put a switch elsewhere on its axis, now."""
+
+    def breaks(self, fault: Fault, lasting: Ns | None) -> int:
+        """Something breaks, now; its number."""
+
+    def mend(self, fault: int) -> None:
+        """The fault of this number is mended, now."""
+
 
 class Send(NamedTuple):
-    """The host of a line sends bytes."""
+    """The host of a line sends characters."""
 
     line: int
-    data: bytes
+    data: Chars
 
     def do(self, cell: Doer) -> None:
         """Do it, now."""
@@ -73,6 +90,17 @@ class SetPin(NamedTuple):
         cell.set_pin(self.unit, self.pin, self.level)
 
 
+class Release(NamedTuple):
+    """An input that was given a level from outside is left to its wire."""
+
+    unit: str
+    pin: str
+
+    def do(self, cell: Doer) -> None:
+        """Do it, now."""
+        cell.release(self.unit, self.pin)
+
+
 class Power(NamedTuple):
     """The supply of a unit is switched."""
 
@@ -82,6 +110,30 @@ class Power(NamedTuple):
     def do(self, cell: Doer) -> None:
         """Do it, now."""
         cell.power(self.unit, self.on)
+
+
+class Load(NamedTuple):
+    """A program is put into the memory of a unit from address `base` on."""
+
+    unit: str
+    image: bytes
+    base: int
+
+    def do(self, cell: Doer) -> None:
+        """Do it, now."""
+        cell.load(self.unit, self.image, self.base)
+
+
+class PlaceSwitch(NamedTuple):
+    """A switch on an axis is put elsewhere: `low` to `high` as in a cell file, None without end."""
+
+    switch: str
+    low: float | None
+    high: float | None
+
+    def do(self, cell: Doer) -> None:
+        """Do it, now."""
+        cell.place_switch(self.switch, self.low, self.high)
 
 
 class Start(NamedTuple):
@@ -94,11 +146,36 @@ class Start(NamedTuple):
         cell.start(self.unit)
 
 
-Deed: TypeAlias = Send | Type | SetSwitch | SetPin | Power | Start
+class Break(NamedTuple):
+    """Something breaks, for a time or until it is mended. Faults are numbered from 1, in the order of their begin."""
+
+    fault: Fault
+    lasting: Ns | None = None
+
+    def do(self, cell: Doer) -> None:
+        """Do it, now."""
+        cell.breaks(self.fault, self.lasting)
+
+
+class Mend(NamedTuple):
+    """A fault is mended."""
+
+    fault: int
+
+    def do(self, cell: Doer) -> None:
+        """Do it, now."""
+        cell.mend(self.fault)
+
+
+Deed: TypeAlias = Send | Type | SetSwitch | SetPin | Release | Power | Start | Load | PlaceSwitch | Break | Mend
 
 
 class Action(NamedTuple):
-    """A deed and its time: an entry of a script, or of a cell's journal."""
+    """A deed and its time: an entry of a script, or of a cell's journal.
+
+    What was done from `outside` comes when everything else of its instant has happened.
+    """
 
     at: Ns
     deed: Deed
+    outside: bool = False

@@ -108,14 +108,12 @@ def _commanded(entry: Motor, found: Rated, load: Load, sequences: tuple[Winding,
 
 
 def _contact(name: str, entry: Switch, motor: Motor) -> Contact:
-    low, high = entry.range
     if entry.axis is not None and split_axis(entry.axis) == (motor.unit, motor.axis):
         # in whole steps, as without a motor: the rotor is at a step while it is nearer to it than to the next
-        ends = (-inf if low is None else low - HALF_A_STEP, inf if high is None else high + HALF_A_STEP)
+        unplaced = Contact(name, -inf, inf, entry.inside, margin=HALF_A_STEP)
     else:
-        lead = motor.lead or 1.0
-        ends = (-inf if low is None else low / lead, inf if high is None else high / lead)
-        if ends[0] == ends[1]:
-            raise MotorError(f"switch {name} has no width: give from and to")
-        ends = min(ends), max(ends)
-    return Contact(name, *ends, entry.inside)
+        unplaced = Contact(name, -inf, inf, entry.inside, lead=motor.lead or 1.0)
+    try:
+        return unplaced.moved(*entry.range)
+    except ValueError as error:
+        raise MotorError(str(error)) from None

@@ -9,7 +9,7 @@ thrown away.
 
 from collections.abc import Sequence
 from copy import deepcopy
-from math import floor, inf
+from math import floor, inf, pi
 from typing import Any
 
 import numpy as np
@@ -188,6 +188,37 @@ class Mechanics:
             if course.power is not None and course.sequencer.moving:
                 course.change(course.power.ends(course.sequencer, motion.at), self.trace)
         self._plan(motion.at)
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """The switches that its rotor moves."""
+        return tuple(contact.name for contact in self.contacts)
+
+    def move_contact(self, name: str, low: float | None, high: float | None, now: Ns) -> None:
+        """Put a contact elsewhere: places as its cell file counts them. ValueError if that has no width."""
+        self._go_before(now)
+        index = self.contact_names.index(name)
+        moved = self.contacts[index].moved(low, high)
+        self.contacts = (*self.contacts[:index], moved, *self.contacts[index + 1 :])
+        self._sides[index] = moved.side(float(self.place_of(self._course.rotor.angle)))
+        if self._powered:
+            self._driver.set(name, moved.level(self._sides[index]), now)
+        self._plan(now)
+
+    @property
+    def standing(self) -> Floats:
+        """The first row of the trace: how the rotor stood before anything moved it."""
+        return self._first
+
+    @property
+    def cycle(self) -> float:
+        """Steps of the axis in an electrical cycle: four full steps."""
+        return 2 * pi / self._pitch
+
+    def catch_up(self, now: Ns) -> Rotor:
+        """Compute the rotor up to `now`, for somebody who asks again and again; it is the same whoever asks."""
+        self._go_before(now)
+        return self.rotor_at(now)
 
     def heed(self, told: DriveSet | StageSet | Powered) -> None:
         """The controller commands its power stage: from now on that counts, and not what the drive was set to."""

@@ -37,6 +37,9 @@ Entry: TypeAlias = Output | InputSet | Received
 
 T = TypeVar("T")
 
+Batch: TypeAlias = tuple[int, Sequence[Entry]]
+"""A unit, by its number, and what it did in one go."""
+
 
 class Span(NamedTuple):
     """Pulses `first` to `last` of `train` (none if last < first), given in `direction` by one unit.
@@ -76,6 +79,12 @@ class Log(Generic[T]):
         self._items.append(item)
         self._size += 1
 
+    def take(self) -> list[T]:
+        """Everything that is in it; it begins anew. Copies keep what they have."""
+        taken = self._items if len(self._items) == self._size else self._items[: self._size]
+        self._items, self._size = [], 0
+        return taken
+
     def __deepcopy__(self, _: object) -> Self:
         twin = type(self).__new__(type(self))
         twin._items, twin._size = self._items, self._size  # noqa: SLF001 (its own class)
@@ -89,7 +98,7 @@ class Recording:
 
     def __init__(self, units: Sequence[str]) -> None:
         self.units = tuple(units)
-        self._batches: Log[tuple[int, Sequence[Entry]]] = Log()
+        self._batches: Log[Batch] = Log()
 
     def __len__(self) -> int:
         """How many entries there are."""
@@ -102,6 +111,10 @@ class Recording:
     def extend(self, unit: int, entries: Sequence[Entry]) -> None:
         """Add what one unit did."""
         self._batches.append((unit, entries))
+
+    def take(self) -> list[Batch]:
+        """The batches since the last call. For somebody who keeps them elsewhere."""
+        return self._batches.take()
 
     def of(self, unit: str) -> list[Entry]:
         """The entries of one unit, in order."""

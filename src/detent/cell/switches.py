@@ -70,6 +70,7 @@ class AxisSwitch(Switch):
     def __init__(self, low: int | None, high: int | None, inside: Level, shaft: int = 0, axis: str = "") -> None:
         self._low, self._high, self._inside, self._axis = low, high, inside, axis
         self._motion: MotionStarted | None = None
+        self._shaft = shaft  # where the motion before this one ended
         self._pulse = 0  # the one at which the level changes next
         super().__init__(self._level_at(shaft))
 
@@ -84,10 +85,34 @@ class AxisSwitch(Switch):
             self._motion = motion
             self._plan(motion, motion.first)
         else:
-            self.deadline = NEVER
+            if self._motion is not None:
+                self._shaft = self._motion.shaft + self._motion.direction * motion.last
+            self._motion, self.deadline = None, NEVER
 
     def heed(self, told: DriveSet | StageSet | Powered) -> None:
         """It counts pulses: the windings are nothing to it."""
+
+    @property
+    def range(self) -> tuple[int | None, int | None]:
+        """First and last step at which it has its level inside."""
+        return self._low, self._high
+
+    def move_contact(self, name: str, low: float | None, high: float | None, now: Ns) -> None:
+        """Put it elsewhere: whole steps. ValueError for others, and for an end before the beginning."""
+        if any(place is not None and place != int(place) for place in (low, high)):
+            raise ValueError(f"switch {name} is placed in whole steps")
+        if low is None and high is None:
+            raise ValueError(f"switch {name} needs a place: an end at least")
+        if low is not None and high is not None and low > high:
+            raise ValueError(f"switch {name} ends at {high:g}, before it begins at {low:g}: exchange them")
+        self._low, self._high = None if low is None else int(low), None if high is None else int(high)
+        motion, shaft, given = self._motion, self._shaft, 0
+        if motion is not None:
+            given = max(motion.train.steps_by(now), motion.first - 1)
+            shaft = motion.shaft + motion.direction * given
+        self._change(self._level_at(shaft), now)
+        if motion is not None:
+            self._plan(motion, given + 1)
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
         """A hand may hold the contact; the axis moves it on at its next edge."""

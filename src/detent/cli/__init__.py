@@ -9,15 +9,27 @@ ASKED_WRONGLY = 2
 VERBS = {
     "demo": ("detent.cli.demo:demo", "Run an example cell, tell what happens, and draw it."),
     "models": ("detent.cli.models:models", "List the controllers, or show one with all its tables."),
+    "workbench": ("detent.cli.workbench:workbench", "Show a controller or a cell in a browser, running in real time."),
     "serve": ("detent.cli.serve:serve", "Serve a controller or a cell in real time, until Ctrl-C."),
+    "control": ("detent.cli.control:control", "Look at a cell that is served, meddle with it, break it."),
     "run": ("detent.cli.run:run", "Run a controller or a cell in virtual time and say where everything ended."),
     "asm": ("detent.cli.assemble:asm", "Assemble a program: labels and comments in, commands or an image out."),
     "list": ("detent.cli.assemble:list_", "List a program source with the address and bytes of every instruction."),
     "disasm": ("detent.cli.assemble:disasm", "Turn a program image back into source, with labels for its jumps."),
+    "find": ("detent.cli.find:find", "Look for controllers, at the serial ports of this computer or at those named."),
+    "send": ("detent.cli.send:send", "Send command lines to a unit and print what it answers."),
+    "terminal": ("detent.cli.terminal:terminal", "Talk to a unit: type command lines, see answers and meaning."),
+    "bench": ("detent.cli.link_bench:bench", "Measure reply times and throughput of a link."),
+    "backup": ("detent.cli.backup:backup", "Write everything that a unit keeps to a readable file."),
+    "restore": ("detent.cli.backup:restore", "Write a backup back to a unit."),
+    "upload": ("detent.cli.program:upload", "Assemble a program and store it in a unit, verified."),
+    "download": ("detent.cli.program:download", "Read the program of a unit, as source with labels."),
+    "compare": ("detent.cli.program:compare", "Compare the program of a unit with a source file."),
     "motor": ("detent.cli.motor:motor", "Say what a motor makes of its pulses: torque against speed, a move judged."),
     "table": ("detent.cli.table:table", "Compile a curve into the table of differences of a SUPERSIGMA drive."),
     "size": ("detent.cli.size:size", "Compute supplies and currents for a controller, as its manual does."),
     "wiring": ("detent.cli.wiring:wiring", "Find a motor's windings from the resistances between its leads."),
+    "epics": ("detent.cli.epics:epics", "Serve axes as EPICS motor records by Channel Access, until Ctrl-C."),
 }
 """Each verb's function, and its first line of help, which `detent --help` shows without importing the function."""
 

@@ -34,7 +34,7 @@ def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bo
 
     if name not in TITLES:
         asked_wrongly(unknown("example", name, tuple(TITLES)))
-    place = _examples() / name / "cell.toml"
+    place = examples() / name / "cell.toml"
     found = target(str(place))
     cell = build(found.description, found.read)
     while cell.step() is not None:
@@ -53,7 +53,7 @@ def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bo
     _print_end(cell, told, files, place)
 
 
-def _examples() -> Path:
+def examples() -> Path:
     """The examples: beside an installed package, or in the project's own folder."""
     package = Path(__file__).parents[1]
     installed = package / "examples"

@@ -3,6 +3,7 @@
 import gc
 import json as json_text
 import math
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from cyclopts import Parameter
 
 if TYPE_CHECKING:
     from detent.cell.description import Description
+    from detent.realtime.endpoints.tcp import TcpAddress
     from detent.realtime.endpoints.wanted import Wanted
     from detent.realtime.service import Served, Service
 
@@ -21,17 +23,20 @@ def serve(
     *,
     pty: Annotated[list[Path] | None, Parameter(consume_multiple=(0, 1), negative=())] = None,
     tcp: str | None = None,
+    rfc2217: str | None = None,
     serial: Path | None = None,
     pace: float = 1.0,
     line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
     strap: Annotated[Sequence[str], Parameter(negative=())] = (),
     set_: Annotated[Sequence[str], Parameter(name="--set", negative=())] = (),
     state: Path | None = None,
+    control: str | None = None,
+    token: str | None = None,
     json: bool = False,
 ) -> None:
     """Serve a controller or a cell in real time, until Ctrl-C.
 
-    Without --pty, --tcp and --serial every line gets the endpoint of its cell file, or a pseudo-terminal.
+    Without --pty, --tcp, --rfc2217 and --serial every line gets the endpoint of its cell file, or a pseudo-terminal.
     What to connect to is printed.
 
     Parameters
@@ -42,6 +47,8 @@ def serve(
         Open a pseudo-terminal; with a value, make this symbolic link to it (of several lines: LINK-LINE).
     tcp
         Listen on HOST:PORT for one client at a time. Port 0: any free port; several lines count up from PORT.
+    rfc2217
+        The same as a serial port over TCP: a client sets baud rate and format, and hears garbage if they do not fit.
     serial
         Be the controller at this serial device. The line timing is then left to the wire.
     pace
@@ -54,6 +61,10 @@ def serve(
         OPTION=VALUE, or UNIT.OPTION=VALUE for a cell.
     state
         Keep EEPROM images in this folder instead of $XDG_STATE_HOME/detent or ~/.local/state/detent.
+    control
+        Listen on HOST:PORT for who looks and meddles, see `detent control`. Port 0: any free port.
+    token
+        What those have to know, where it is not this computer alone that can ask; $DETENT_TOKEN without it.
     json
         Print one line of JSON once everything is open, and nothing else.
     """
@@ -73,7 +84,8 @@ def serve(
             raise Problem("", "", "say what to serve: a model like gs-c200 (detent models), or a CELL.toml")
         if not (math.isfinite(pace) and pace > 0):
             raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
-        wanted = _wanted(links, tcp, serial)
+        wanted = asked_endpoints(links, tcp, rfc2217, serial)
+        control_at = None if control is None else _address("--control", control)
         found = find(target, straps=strap, options=set_)
         folder = state if state is not None else default_folder()
         name = cell_name(target, is_file=bool(found.description.file))
@@ -82,7 +94,9 @@ def serve(
         asked_wrongly(error)
     try:
         try:
-            service = Service(found.description, found.read, wanted, pace=pace, line_timing=line_timing, images=images)
+            service = Service(found.description, found.read, wanted, pace=pace, line_timing=line_timing,
+                              images=images, observed=control_at is not None)  # fmt: skip
+            url = _control(service, control_at, token)
         except (Problem, EndpointError) as error:
             asked_wrongly(error)
         except ValueError as error:
@@ -92,9 +106,9 @@ def serve(
             for report in service.reports:
                 print(f"detent: {report}", file=sys.stderr)
             if json:
-                print(json_text.dumps(_facts(service.endpoints)), flush=True)
+                print(json_text.dumps(_facts(service.endpoints, url)), flush=True)
             else:
-                _print_ready(service, found.description, folder, pace)
+                _print_ready(service, found.description, folder, pace, url)
             gc.freeze()  # what is there now stays: no collection shall look at it while a deadline waits
             try:
                 service.run()
@@ -106,33 +120,62 @@ def serve(
         images.close()
 
 
-def _wanted(links: list[Path] | None, tcp: str | None, serial: Path | None) -> "list[Wanted]":
+def asked_endpoints(
+    links: list[Path] | None, tcp: str | None, rfc2217: str | None, serial: Path | None
+) -> "list[Wanted]":
     """The endpoints that the command line asks for. Raises Problem."""
-    from detent.cell.description import Problem
     from detent.realtime.endpoints.wanted import Wanted
 
     wanted = []
     if links is not None:
         wanted.append(Wanted("pty", str(links[0]) if links else ""))
-    if tcp is not None:
-        try:
-            wanted.append(Wanted("tcp", tcp).checked())
-        except ValueError as error:
-            raise Problem("", "--tcp", str(error)) from None
+    for kind, address in (("tcp", tcp), ("rfc2217", rfc2217)):
+        if address is not None:
+            _address(f"--{kind}", address)
+            wanted.append(Wanted(kind, address))
     if serial is not None:
         wanted.append(Wanted("serial", str(serial)))
     return wanted
 
 
-def _facts(endpoints: "Sequence[Served]") -> dict[str, object]:
+def _address(flag: str, text: str) -> "TcpAddress":
+    """HOST:PORT of an option. Raises Problem."""
+    from detent.cell.description import Problem
+    from detent.realtime.endpoints.tcp import TcpAddress
+
+    try:
+        return TcpAddress.parse(text)
+    except ValueError as error:
+        raise Problem("", flag, str(error)) from None
+
+
+def _control(service: "Service", address: "TcpAddress | None", token: str | None) -> str | None:
+    """Open the interface for looks and interference; its URL. It ends with the service. Raises EndpointError."""
+    from detent.realtime.control import Control
+    from detent.realtime.http import TOKEN, HttpControl
+
+    if address is None:
+        return None
+    try:
+        http = HttpControl(Control(service), address, token or os.environ.get(TOKEN))
+    except BaseException:
+        service.close()
+        raise
+    service.ends_with(http.close)
+    return http.url
+
+
+def _facts(endpoints: "Sequence[Served]", control: str | None) -> dict[str, object]:
     """What `--json` tells."""
     return {
         "endpoints": [{"unit": e.unit, "kind": e.kind, "address": e.address} for e in endpoints],
-        "control": None,
+        "control": control,
     }
 
 
-def _print_ready(service: "Service", description: "Description", folder: Path, pace: float) -> None:
+def _print_ready(
+    service: "Service", description: "Description", folder: Path, pace: float, control: str | None
+) -> None:
     """Say what is served, and how to connect: a line to copy for each endpoint."""
     speed = "real time" if pace == 1 else f"{pace:g} times real time"
     print(f"Serving {', '.join(description.units)} in {speed}; EEPROM images in {folder}")
@@ -144,6 +187,8 @@ def _print_ready(service: "Service", description: "Description", folder: Path, p
     longest = max(len(command) for _, command in commands)
     for endpoint, command in commands:
         print(f"  {endpoint.unit:{width}}  {command:{longest}}  # {_what(endpoint)}")
+    if control is not None:
+        print(f"Look at it, meddle with it, break it:\n  detent control {control}")
     for hint in _hints(description):
         print(hint)
     print("Ctrl-C ends it.", flush=True)
@@ -160,22 +205,13 @@ def _hints(description: "Description") -> list[str]:
 
 def _straps(description: "Description") -> list[tuple[str, str]]:
     """Every controller with its model and its straps as they are read."""
-    from detent.controllers import catalogue
+    from detent.realtime.service import strap_levels
 
     listed = []
-    alone = [[name] for name in description.units if not description.lines]
-    for units in [line.units for line in description.lines.values()] + alone:
-        found = [catalogue.MODELS.get(description.units[unit].model) for unit in units]
-        if found[0] is None or None in found:
-            continue  # a part without a serial line
-        named = [
-            (unit, {pin: catalogue.strap_level(found[0], pin, level) for pin, level in straps.items()})
-            for unit in units
-            for straps in [description.units[unit].straps]
-        ]
-        for unit, levels in zip(units, found[0].strap_line(named), strict=True):
-            text = " ".join(f"{pin}={level}" for pin, level in levels.items())
-            listed.append((unit, f"{description.units[unit].model}, straps {text}" if text else found[0].name))
+    for unit, levels in strap_levels(description).items():
+        model = description.units[unit].model
+        text = " ".join(f"{pin}={level}" for pin, level in levels.items())
+        listed.append((unit, f"{model}, straps {text}" if text else model))
     return listed
 
 
@@ -185,12 +221,23 @@ def _command(endpoint: "Served") -> str:
         case "pty":  # without the format, which a pseudo-terminal does not have
             return f"picocom --baud {endpoint.form.baud} {endpoint.address}"
         case "tcp":
-            host, _, port = endpoint.address.rpartition(":")
-            host = {"0.0.0.0": "127.0.0.1", "[::]": "::1"}.get(host, host.strip("[]"))
+            host, port = _reachable(endpoint.address)
             # Enter sends CR, at once: what the controllers wait for and a terminal in its usual mode never sends
             return f"stty -icrnl -icanon; nc {host} {port}; stty sane"
+        case "rfc2217":
+            host, port = _reachable(endpoint.address)
+            url = f"rfc2217://{f'[{host}]' if ':' in host else host}:{port}"
+            form = endpoint.form  # as pyserial wants it
+            settings = f'{form.baud}, {form.data_bits}, "{form.parity[0].upper()}", {form.stop_bits}'
+            return f'serial.serial_for_url("{url}", {settings})'
         case _:
             return endpoint.address
+
+
+def _reachable(address: str) -> tuple[str, str]:
+    """Host and port at which a client on this computer reaches what listens on `address`."""
+    host, _, port = address.rpartition(":")
+    return {"0.0.0.0": "127.0.0.1", "[::]": "::1"}.get(host, host.strip("[]")), port
 
 
 def _what(endpoint: "Served") -> str:
@@ -200,6 +247,8 @@ def _what(endpoint: "Served") -> str:
             return f"pseudo-terminal, {endpoint.form}"
         case "tcp":
             return f"TCP {endpoint.address}, {endpoint.form}"
+        case "rfc2217":
+            return f"RFC 2217 (pyserial), {endpoint.form}"
         case _:
             return f"the wire at this serial port, {endpoint.form}"
 

@@ -13,18 +13,23 @@ from detent.controllers.dcb274 import link as dcb274_link
 from detent.controllers.dcb274 import pins as dcb274_pins
 from detent.controllers.dcb274 import program as dcb274_program
 from detent.controllers.dcb274.firmware import Dcb274
+from detent.controllers.dcb274.phrases import Phrases as Dcb274Phrases
 from detent.controllers.device import CommandHelp, Controller
 from detent.controllers.genstepper import commands as genstepper_commands
 from detent.controllers.genstepper import pins as genstepper_pins
 from detent.controllers.genstepper.firmware import GenStepper
+from detent.controllers.genstepper.phrases import Phrases as GenStepperPhrases
 from detent.controllers.gsc200 import commands as gsc200_commands
 from detent.controllers.gsc200 import pins as gsc200_pins
 from detent.controllers.gsc200 import program as gsc200_program
 from detent.controllers.gsc200.firmware import GsC200
+from detent.controllers.gsc200.phrases import Phrases as GsC200Phrases
+from detent.controllers.phrase import Lines, Phrases
 from detent.controllers.supersigma import commands as supersigma_commands
 from detent.controllers.supersigma import link as supersigma_link
 from detent.controllers.supersigma import pins as supersigma_pins
 from detent.controllers.supersigma.firmware import Supersigma
+from detent.controllers.supersigma.phrases import Phrases as SupersigmaPhrases
 from detent.controllers.supersigma.program import LEAST_OFFSET
 from detent.pins import Level, Pin, PinKind
 from detent.ramps import differences
@@ -75,6 +80,8 @@ class Model(NamedTuple):
     answered: Callable[[str], bool] = lambda text: True  # whether a host gets an answer to a command line
     limits: Limits = NO_LIMITS
     by_hand: str = ""  # a line for people who type to it on a terminal
+    saves: str = ""  # the command line that keeps program memory without supply; "" where none does
+    phrases: Callable[[Mapping[str, Level]], Phrases] = lambda straps: Lines()  # what is said on its line, in words
 
 
 def unknown(kind: str, name: str, known: Sequence[str]) -> CatalogueError:
@@ -238,6 +245,8 @@ def _gsc200(name: str, options: tuple[Option, ...]) -> Model:
         gsc200_pins.strap_line,
         limits=Limits(gsc200_pins.SUPPLY_V, gsc200_pins.LOADS_A),
         by_hand="To type by hand, strap the checksum off: CHS=low. Lines end with CR (Ctrl-M, or Enter in picocom).",
+        saves=gsc200_commands.Op.MEMORY.value,
+        phrases=lambda straps: GsC200Phrases(name, straps),
     )
 
 
@@ -285,6 +294,7 @@ def _genstepper(name: str, port: str) -> Model:
         None,
         lambda: genstepper_commands.reference(name),
         lambda units: genstepper_pins.strap_line(name, units),
+        phrases=lambda straps: GenStepperPhrases(),
     )
 
 
@@ -335,6 +345,7 @@ MODELS: dict[str, Model] = {
         line="microbus",
         told_apart_by="number",
         answered=supersigma_link.answered,
+        phrases=lambda straps: SupersigmaPhrases(),
     ),
     "dcb-274": Model(
         "dcb-274",
@@ -347,6 +358,8 @@ MODELS: dict[str, Model] = {
         dcb274_program.language,
         dcb274_commands.reference,
         dcb274_pins.strap_line,
+        saves=dcb274_commands.Op.SAVE.value,
+        phrases=lambda straps: Dcb274Phrases(),
     ),
     "bs0610": _genstepper("bs0610", "RS-232"),
     "bs0710": _genstepper("bs0710", "USB"),

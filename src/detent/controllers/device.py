@@ -12,7 +12,7 @@ A device can be copied at any moment (`copy.deepcopy`) and both copies go on ide
 changes (tables, trains, options) returns itself when copied.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
@@ -201,6 +201,10 @@ class Controller(Device, Protocol):
         """How characters look on that port."""
 
     @property
+    def straps(self) -> Mapping[str, Level]:
+        """How its straps are tied now; what counts is how they were when they were read."""
+
+    @property
     def axes(self) -> Sequence[str]:
         """The names of its axes; one without a name where it has but one."""
 
@@ -215,6 +219,15 @@ class Controller(Device, Protocol):
 
     def answers(self, data: bytes) -> list[str]:
         """What a host reads in the bytes that came from it: the answers, without what the link adds."""
+
+    def registers(self, now: Ns) -> dict[str, str]:
+        """What a debugger shows beside the position, by the letters of the manual: rates, rounds of loops, errors."""
+
+    def program_memory(self) -> bytes:
+        """Program memory from its first address on, as `load` takes it; nothing where there is none."""
+
+    def kept_memory(self) -> bytes:
+        """Non-volatile memory, as `restore` takes it; nothing where there is none."""
 
     def restore(self, image: bytes) -> None:
         """Put `image` into non-volatile memory, before the first power-on. Raises `detent.assembler.ImageError`."""

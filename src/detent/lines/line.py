@@ -5,11 +5,11 @@ the end of their last stop bit, or earlier where a receiver does not wait for it
 on which a 0 wins: characters of two units that coincide in time merge bit by bit, ones that overlap are damaged.
 """
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 from detent.pins import Level
 from detent.ticks import NEVER, Ns
-from detent.uart import SOUND, Char, Format, Sent, Transmitter
+from detent.uart import Char, Chars, Format, Sent, Transmitter, characters
 
 HOST_PORT = "HOST"
 EVERYBODY = -1
@@ -56,8 +56,8 @@ class Line:
         "heard",
     )
 
-    hosted: ClassVar[bool] = False  # whether its host is a unit of the cell
-    strobe: ClassVar[str] = ""  # the input of every unit that the line drives, if it has such a wire
+    hosted: bool = False  # whether its host is a unit of the cell
+    strobe: str = ""  # the input of every unit that the line drives, if it has such a wire
 
     def __init__(self, form: Format, *, timed: bool = True, early: Ns = 0, start_bits: bool = False) -> None:
         self.format = form
@@ -70,16 +70,22 @@ class Line:
         self._host = Transmitter(HOST_PORT, form, self._on_wire, timed=timed)
         self._from_units: list[Talking] = []
 
-    def immediate(self, data: bytes) -> list[Char]:
+    def immediate(self, data: Chars) -> list[Char]:
         """`data` as every unit hears it at once, on a plain line without timing; else nothing: `send` it."""
         if not self._immediate:
             return []
-        limit = 1 << self.format.data_bits
-        return [SOUND[value] if value < limit else Char(value % limit, parity_ok=False) for value in data]
+        return [self._narrowed(char) for char in characters(data)]
 
-    def send(self, data: bytes, now: Ns) -> None:
+    def send(self, data: Chars, now: Ns) -> None:
         """The host sends `data`, behind what it is still sending. A byte too wide for the line arrives damaged."""
         self._host.send(data, now)
+        self._plan()
+
+    def change(self, form: Format) -> None:
+        """The host speaks in another format from now on; what it has not begun to send is lost."""
+        self._host.discard()
+        self._host.change(form)
+        self.format = form
         self._plan()
 
     @property
@@ -115,16 +121,20 @@ class Line:
             del self._on_wire[: len(arrived)]
             self._told = max(self._told - len(arrived), 0)
         self._plan()
-        return [Arrival(EVERYBODY, self._narrowed(sent)) for sent in arrived]
+        return [Arrival(EVERYBODY, self._arriving(sent)) for sent in arrived]
 
     def strobes(self, now: Ns) -> list[Level]:
         """The levels that the strobe takes up to and including `now`, in order; to be asked before `advance`."""
         return []
 
-    def _narrowed(self, sent: Sent) -> Sent:
+    def _arriving(self, sent: Sent) -> Sent:
+        char = self._narrowed(sent.char)
+        return sent if char is sent.char else sent._replace(char=char)
+
+    def _narrowed(self, char: Char) -> Char:
         """The character as it arrives: one too wide for the line has its parity spoilt."""
-        value, width = sent.char.value, 1 << self.format.data_bits
-        return sent if value < width else sent._replace(char=Char(value % width, parity_ok=False))
+        width = 1 << self.format.data_bits
+        return char if char.value < width else char._replace(value=char.value % width, parity_ok=False)
 
     def started(self) -> bool:
         """Whether the host has begun a character since the last call. Never, unless units want to know."""

@@ -7,7 +7,6 @@ goes high. How long a byte takes is our assumption, and the format's matter.
 """
 
 from collections import deque
-from typing import ClassVar
 
 from detent.lines.line import Arrival, Line
 from detent.pins import HIGH, LOW, Level
@@ -20,7 +19,7 @@ class Microbus(Line):
 
     __slots__ = ("_edges", "_strobed")
 
-    strobe: ClassVar[str] = "T0"
+    strobe: str = "T0"
 
     def __init__(self, form: Format, *, timed: bool = True, early: Ns = 0, start_bits: bool = False) -> None:
         self._edges: deque[tuple[Ns, Level]] = deque()  # of the strobe, to come

@@ -4,11 +4,9 @@ Two pairs of wires: every axis hears what the adapter sends, the adapter hears e
 their pair, on which a 0 wins, as on any `Line`. A party line without an adapter in the cell is a plain `Line`.
 """
 
-from typing import ClassVar
-
 from detent.lines.line import Arrival, Line, Talking
 from detent.ticks import Ns
-from detent.uart import Format, Sent
+from detent.uart import Chars, Format, Sent
 
 
 class PartyLine(Line):
@@ -16,13 +14,13 @@ class PartyLine(Line):
 
     __slots__ = ("_places",)
 
-    hosted: ClassVar[bool] = True
+    hosted: bool = True
 
     def __init__(self, form: Format, places: int, *, timed: bool = True) -> None:
         super().__init__(form, timed=timed)
         self._places = places
 
-    def send(self, data: bytes, now: Ns) -> None:
+    def send(self, data: Chars, now: Ns) -> None:
         """Nobody outside is the host of this line."""
         raise ValueError("the host of this line is a unit of the cell: send to that unit")
 

@@ -42,6 +42,9 @@ class Rows(Immutable):
     def __hash__(self) -> int:
         return hash((len(self.counts), self.pulses_list[-1], self.ticks_list[-1]))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return Rows, (self.counts, self.periods)
+
 
 def _column(values: npt.ArrayLike, name: str) -> Int64Array:
     column = np.array(values)

@@ -20,9 +20,10 @@ from pathlib import Path
 from typing import Any, Protocol, TypeAlias, TypeVar
 
 from detent.lines.line import Heard
-from detent.realtime.endpoints.endpoint import Endpoint
+from detent.realtime.endpoints.endpoint import Endpoint, Listener
 from detent.realtime.pace import Pace, WallNs
 from detent.ticks import MS, SECOND, US, Ns
+from detent.uart import Chars
 
 EARLY: WallNs = 60 * US  # sleeping is given up so long before a deadline: no system wakes a sleeper to the microsecond
 LONGEST: WallNs = 2 * MS  # a cell that cannot keep pace lets the clients have a word so often
@@ -50,7 +51,9 @@ class ServedLine(Protocol):
 class Served(Protocol):
     """What the loop needs of a cell."""
 
-    now: Ns
+    @property
+    def now(self) -> Ns:
+        """Its time."""
 
     @property
     def lines(self) -> Sequence[ServedLine]:
@@ -62,7 +65,7 @@ class Served(Protocol):
     def run_to(self, until: Ns) -> None:
         """Let everything happen up to and including `until`."""
 
-    def send(self, line: int, data: bytes) -> None:
+    def send(self, line: int, data: Chars) -> None:
         """The host of a line sends `data`, now."""
 
 
@@ -85,8 +88,12 @@ class Loop:
         self._cell, self._pace, self._wait = cell, pace, wait
         self._endpoints = list(endpoints)
         self._of_line: dict[int, list[Endpoint]] = defaultdict(list)
+        self._listeners: dict[int, list[Listener]] = defaultdict(list)
         for line, endpoint in endpoints:
-            self._of_line[line].append(endpoint)
+            if isinstance(endpoint, Listener):
+                self._listeners[line].append(endpoint)
+            else:
+                self._of_line[line].append(endpoint)
         self._patience = list(patience) if patience is not None else [0] * len(cell.lines)
         self._stopping = False
         self._closed = False
@@ -117,6 +124,11 @@ class Loop:
         else:
             self._wake()
         return future
+
+    @property
+    def waker(self) -> int:
+        """A file descriptor that wakes it when something is written there."""
+        return self._waker
 
     def _wake(self) -> None:
         with contextlib.suppress(BlockingIOError):  # full of earlier calls: it wakes all the same
@@ -215,11 +227,15 @@ class Loop:
                 data = bytes([char.value & 0xFF for _, char in heard])
                 for endpoint in self._of_line[number]:
                     endpoint.send(data, wall)
+                for listener in self._listeners[number]:
+                    listener.hear(heard, wall)
 
 
 @contextlib.contextmanager
 def stopped_by_signals(loop: Loop) -> Iterator[None]:
-    """SIGTERM, SIGINT and SIGHUP stop `loop` while this lasts."""
+    """SIGTERM, SIGINT and SIGHUP stop `loop` while this lasts. For the main thread."""
+    # a signal may reach another thread, and then it does not wake this one, which has to run the handlers
+    descriptor = signal.set_wakeup_fd(loop.waker, warn_on_full_buffer=False)
     signals = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
     before = {number: signal.signal(number, lambda *_: loop.stop()) for number in signals}
     try:
@@ -227,6 +243,7 @@ def stopped_by_signals(loop: Loop) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        signal.set_wakeup_fd(descriptor)
 
 
 def wake_exactly() -> None:

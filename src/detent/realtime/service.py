@@ -2,19 +2,27 @@
 
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from fractions import Fraction
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from detent.cell.build import build
-from detent.cell.cell import Cell
+from detent.cell.cell import Cell, Store, no_store
 from detent.cell.description import Description, Problem
+from detent.cell.mechanics import Mechanics
+from detent.controllers import catalogue
+from detent.pins import Level
 from detent.realtime.endpoints.endpoint import Endpoint
 from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.images import Images
 from detent.realtime.loop import BEHIND, Loop, stopped_by_signals, wake_exactly
 from detent.realtime.pace import LatenessSummary, Pace
+from detent.realtime.waiting import Watched
+from detent.realtime.watch import Lately, Watch
 from detent.uart import Format
+
+T = TypeVar("T")
 
 
 class Served(NamedTuple):
@@ -38,39 +46,46 @@ class Service:
         pace: Fraction | float = 1,
         line_timing: bool = True,
         images: Images | None = None,
+        observed: bool = False,
     ) -> None:
         """Build the cell and open what is `wanted` for every line; nothing: what the cell file says, or a pty.
 
-        `images` stay their owner's. Raises Problem, EndpointError, ValueError.
+        `images` stay their owner's. One that is `observed` can be looked at and meddled with (`realtime.control`).
+        Raises Problem, EndpointError, ValueError.
         """
+        self.description = description
         self.reports: list[str] = []  # about images that could not be used
         if wanted and any(w.kind == "serial" for w in wanted):
             line_timing = False  # the wire outside takes the time
-        self.cell = _build(description, read, images, line_timing, self.reports)
-        names = self.cell.wiring.line_names
-        if not names:
-            raise Problem(description.file, "units", "there is no unit with a serial line to serve")
-        outside = [number for number, line in enumerate(self.cell.lines) if not line.hosted]
-        choices: list[Sequence[Wanted]] = [()] * len(names)
-        for place, number in enumerate(outside):
-            choices[number] = _for_line(description, wanted, place, names[number], len(outside))
-        self.endpoints: list[Served] = []
-        self._opened: list[tuple[int, Endpoint]] = []
+        self.cell = build_with_images(description, read, images, line_timing, self.reports, observed)
+        self.watch = _watch(self.cell) if observed else None
+        self.straps = strap_levels(description) if observed else {}
+        self._company = contextlib.ExitStack()
         self._cleanup = contextlib.ExitStack()
         with contextlib.ExitStack() as opening:
-            for number, choice in enumerate(choices):
-                form = self.cell.lines[number].format
-                for one in choice:
-                    endpoint = one.open(names[number], form)
-                    opening.callback(endpoint.close)
-                    self._opened.append((number, endpoint))
-                    served = Served(self._title(number), endpoint.kind, endpoint.address, form)
-                    self.endpoints.append(served)
+            self._opened = open_endpoints(description, self.cell, wanted, opening)
+            self.endpoints = [
+                Served(self._title(number), endpoint.kind, endpoint.address, self.cell.lines[number].format)
+                for number, endpoint in self._opened
+            ]
             self.pace = Pace(pace, origin=self.cell.now)
             patience = [line.format.duration(BEHIND) for line in self.cell.lines]
-            self._loop = Loop(self.cell, self.pace, self._opened, patience=patience)
+            self.watched = Watched(self.cell, self.pace) if observed else None
+            self._loop = Loop(self.watched or self.cell, self.pace, self._opened, patience=patience)
             opening.callback(self._loop.close)
             self._cleanup = opening.pop_all()
+
+    def ask(self, function: Callable[[], T]) -> "Future[T]":
+        """Call `function` soon on the thread that serves; from any thread. Cancelled when the service is closed."""
+        return self._loop.ask(function)
+
+    def ends_with(self, close: Callable[[], None]) -> None:
+        """Call `close` before the service is closed."""
+        self._company.callback(close)
+
+    def addresses(self) -> list[tuple[int, str, str]]:
+        """Each endpoint: the number of its line, its kind, and what a client connects to."""
+        return [(line, endpoint.kind, endpoint.address) for line, endpoint in self._opened]
 
     def restart_clock(self) -> None:
         """The present of the cell is now: what it did before was done in virtual time."""
@@ -104,6 +119,9 @@ class Service:
 
     def close(self) -> None:
         """Close the endpoints, remove their links. May be called twice."""
+        self._company.close()
+        if self.watched is not None:
+            self.watched.close()
         self._cleanup.close()
 
     def __enter__(self) -> "Service":
@@ -123,6 +141,54 @@ def models(description: Description) -> dict[str, str]:
     return {name: unit.model for name, unit in description.units.items()}
 
 
+def strap_levels(description: Description) -> dict[str, dict[str, Level]]:
+    """The straps of every controller as they are read, those of a line completed line by line."""
+    found: dict[str, dict[str, Level]] = {}
+    alone = [[name] for name in description.units if not description.lines]
+    for units in [line.units for line in description.lines.values()] + alone:
+        models = [catalogue.MODELS.get(description.units[unit].model) for unit in units]
+        if models[0] is None or None in models:
+            continue  # a part without straps
+        named = [
+            (unit, {pin: catalogue.strap_level(models[0], pin, level) for pin, level in straps.items()})
+            for unit in units
+            for straps in [description.units[unit].straps]
+        ]
+        found |= dict(zip(units, models[0].strap_line(named), strict=True))
+    return found
+
+
+def _watch(cell: Cell) -> Watch:
+    """A watch in the place of the recording of `cell`. The past is not kept, and of the journal what is recent."""
+    assert cell.recording is not None
+    watch = Watch(cell.recording.units, cell.recording)
+    cell.recording, cell.journal = watch, Lately()
+    for part in cell.parts:
+        if isinstance(part, Mechanics):
+            part.trace = None
+    return watch
+
+
+def open_endpoints(
+    description: Description, cell: Cell, wanted: Sequence[Wanted], opening: contextlib.ExitStack
+) -> list[tuple[int, Endpoint]]:
+    """Open what is `wanted` for every line, with the line's number; nothing: what the cell file says, or a pty.
+
+    `opening` closes them. Raises Problem, EndpointError, ValueError.
+    """
+    names = cell.wiring.line_names
+    if not names:
+        raise Problem(description.file, "units", "there is no unit with a serial line to serve")
+    outside = [number for number, line in enumerate(cell.lines) if not line.hosted]
+    opened: list[tuple[int, Endpoint]] = []
+    for place, number in enumerate(outside):
+        for one in _for_line(description, wanted, place, names[number], len(outside)):
+            endpoint = one.open(names[number], cell.lines[number].format)
+            opening.callback(endpoint.close)
+            opened.append((number, endpoint))
+    return opened
+
+
 def _for_line(
     description: Description, wanted: Sequence[Wanted], number: int, name: str, lines: int
 ) -> Sequence[Wanted]:
@@ -138,22 +204,25 @@ def _for_line(
         raise Problem(description.file, f"lines.{name}.endpoint", str(error)) from None
 
 
-def _build(
+def build_with_images(
     description: Description,
     read: Callable[[str], str],
     images: Images | None,
     line_timing: bool,
     reports: list[str],
+    record: bool,
+    store: Store | None = None,
 ) -> Cell:
     """The cell with the images that are kept; an image that its controller cannot have written is moved aside."""
     if images is None:
-        return build(description, read, record=False, line_timing=line_timing)
+        return build(description, read, store=store or no_store, record=record, line_timing=line_timing)
     kept: Mapping[str, bytes]
     kept, told = images.load()
     reports += told
     while True:
         try:
-            return build(description, read, images=kept, store=images.save, record=False, line_timing=line_timing)
+            save = store or images.save
+            return build(description, read, images=kept, store=save, record=record, line_timing=line_timing)
         except Problem as problem:
             unit = problem.key.removeprefix("units.")
             if unit not in kept:

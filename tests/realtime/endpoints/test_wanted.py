@@ -15,6 +15,7 @@ FORM = Format(9600)
         ("pty:/tmp/drill", Wanted("pty", "/tmp/drill")),
         ("tcp:127.0.0.1:0", Wanted("tcp", "127.0.0.1:0")),
         ("tcp:[::1]:4001", Wanted("tcp", "[::1]:4001")),
+        ("rfc2217:127.0.0.1:4002", Wanted("rfc2217", "127.0.0.1:4002")),
         ("serial:/dev/ttyUSB0", Wanted("serial", "/dev/ttyUSB0")),
     ],
 )
@@ -22,7 +23,7 @@ def test_an_endpoint_is_read_as_a_cell_file_has_it(text: str, wanted: Wanted) ->
     assert Wanted.parse(text) == wanted
 
 
-@pytest.mark.parametrize("text", ["", "tcp", "serial:", "udp:1", "/dev/ttyS0", "tcp:4001"])
+@pytest.mark.parametrize("text", ["", "tcp", "serial:", "udp:1", "/dev/ttyS0", "tcp:4001", "rfc2217:4001"])
 def test_what_is_no_endpoint_is_refused_with_an_example(text: str) -> None:
     with pytest.raises(ValueError, match="; write "):
         Wanted.parse(text)
@@ -32,6 +33,7 @@ def test_of_several_lines_each_gets_its_own() -> None:
     assert Wanted("pty").of_several(1, "b") == Wanted("pty")
     assert Wanted("pty", "/tmp/x").of_several(1, "b") == Wanted("pty", "/tmp/x-b")
     assert Wanted("tcp", "127.0.0.1:0").of_several(1, "b") == Wanted("tcp", "127.0.0.1:0")
+    assert Wanted("rfc2217", "127.0.0.1:4001").of_several(1, "b") == Wanted("rfc2217", "127.0.0.1:4002")
     assert Wanted("tcp", "[::1]:4001").of_several(2, "c") == Wanted("tcp", "[::1]:4003")
 
 
@@ -42,7 +44,7 @@ def test_what_cannot_be_shared_out_is_refused() -> None:
         Wanted("serial", "/dev/ttyS0").of_several(0, "a")
 
 
-@pytest.mark.parametrize("wanted", [Wanted("pty"), Wanted("tcp", "127.0.0.1:0")])
+@pytest.mark.parametrize("wanted", [Wanted("pty"), Wanted("tcp", "127.0.0.1:0"), Wanted("rfc2217", "127.0.0.1:0")])
 def test_it_opens_what_it_names(wanted: Wanted) -> None:
     endpoint = wanted.open("drill", FORM)
     assert endpoint.kind == wanted.kind

@@ -26,7 +26,7 @@ from detent.controllers.dcb274.link import (
     is_name,
     next_name,
 )
-from detent.controllers.dcb274.memory import POWER_UP, Memory
+from detent.controllers.dcb274.memory import POWER_UP, SIZE, Memory
 from detent.controllers.dcb274.motion import Motion, News
 from detent.controllers.dcb274.ports import Ports
 from detent.controllers.dcb274.running import Running
@@ -236,6 +236,11 @@ class Dcb274:
         return pins.SERIAL_PORT
 
     @property
+    def straps(self) -> Mapping[str, Level]:
+        """How its straps are tied now."""
+        return self._straps
+
+    @property
     def axes(self) -> Sequence[str]:
         """One axis, without a name."""
         return ("",)
@@ -281,6 +286,20 @@ class Dcb274:
     def answers(self, data: bytes) -> list[str]:
         """The lines in what the unit sent, echoes included."""
         return [line for line in data.decode("latin-1").replace("\r", "\n").split("\n") if line]
+
+    def registers(self, now: Ns) -> dict[str, str]:
+        """The registers of X, the trip, and what the jump counter has left."""
+        found = self._settings.registers()
+        left = self._running.left
+        return found if left is None else found | {"J": f"{left} left"}
+
+    def program_memory(self) -> bytes:
+        """NV memory with the shadow RAM over it: where programs run."""
+        return self.memory.read(0, SIZE)
+
+    def kept_memory(self) -> bytes:
+        """NV memory."""
+        return self.memory.nv
 
     def restore(self, image: bytes) -> None:
         """Put `image` into NV memory: a whole one, or a program for address 0. Raises `detent.assembler.ImageError`."""

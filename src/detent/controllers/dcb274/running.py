@@ -66,6 +66,11 @@ class Running:
         """Whether a program runs, its last motion included."""
         return self.stage is not Stage.IDLE
 
+    @property
+    def left(self) -> int | None:
+        """Rounds that the jump counter of J still has; None when it is idle."""
+        return self._left
+
     def go(self, address: int, trace: bool, now: Ns) -> None:
         """G: start at an address, or by the ports."""
         self.reset()

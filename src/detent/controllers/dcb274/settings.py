@@ -81,6 +81,15 @@ class Settings:
             _CURRENT: self.current[0], _CURRENT + 1: self.current[1], _READOUT: self.readout,
         }  # fmt: skip
 
+    def registers(self) -> dict[str, str]:
+        """The registers by the letters of their commands, as X has them."""
+        up, down = self.ramp
+        return {
+            "I": str(rate_of(self.initial)), "V": str(rate_of(self.slew)), "K": f"{up}/{down}", "D": str(self.divide),
+            "H": RESOLUTION_NAMES[self.resolution], "b": str(self.decay), "l": str(self.options),
+            "T": str(self.trip), "Y": f"{self.current[0]}/{self.current[1]} %", "n": chr(self.name),
+        }  # fmt: skip
+
     def load(self, memory: Memory) -> None:
         """Reset and C: the registers as NV memory has them."""
         nv = memory.nv

@@ -175,6 +175,11 @@ class Board:
         return pins.SERIAL_PORT
 
     @property
+    def straps(self) -> Mapping[str, Level]:
+        """How its straps are tied now."""
+        return self._straps
+
+    @property
     def axes(self) -> Sequence[str]:
         """X and Y."""
         return AXES

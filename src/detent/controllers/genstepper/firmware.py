@@ -42,6 +42,22 @@ class GenStepper(Board):
         """The lines, and the prompts, in what the board sent."""
         return link.undress(data)
 
+    def registers(self, now: Ns) -> dict[str, str]:
+        """K, P and R of each motor, the mark of M, A of both, and where a motion leads."""
+        found = {"A": str(self._auto)}
+        for axis, motor in self._motors.items():
+            found |= {f"{axis} K": str(motor.keep), f"{axis} P": str(motor.slope), f"{axis} R": str(motor.rate),
+                      f"{axis} M": str(motor.mark), f"{axis} G": str(motor.seen_target(now))}  # fmt: skip
+        return found
+
+    def program_memory(self) -> bytes:
+        """It holds no program."""
+        return b""
+
+    def kept_memory(self) -> bytes:
+        """It keeps nothing."""
+        return b""
+
     def restore(self, image: bytes) -> None:
         """It has no non-volatile memory."""
         raise ImageError(f"a {self.model} keeps nothing: it has no image")

@@ -168,6 +168,11 @@ class GsC200:
         return pins.SERIAL_PORT
 
     @property
+    def straps(self) -> Mapping[str, Level]:
+        """How its straps are tied now."""
+        return self._straps
+
+    @property
     def axes(self) -> Sequence[str]:
         """One axis, without a name."""
         return ("",)
@@ -194,6 +199,21 @@ class GsC200:
     def answers(self, data: bytes) -> list[str]:
         """The answers in what this module sent."""
         return self._link.undress(data)
+
+    def registers(self, now: Ns) -> dict[str, str]:
+        """S, T and R as they were commanded, the rounds of loops by the address of their L, the error that F tells."""
+        motion, running = self._motion, self._running
+        found = {"S": str(motion.start_stop), "T": str(motion.slew), "R": str(motion.ramp)}
+        found |= {f"L at {address}": f"round {rounds}" for address, rounds in running.rounds()}
+        return found | ({"F": f"E{running.error}"} if running.error else {})
+
+    def program_memory(self) -> bytes:
+        """The program in RAM."""
+        return self._ram.image()
+
+    def kept_memory(self) -> bytes:
+        """The program in the EEPROM."""
+        return self._eeprom.image()
 
     def restore(self, image: bytes) -> None:
         """Put `image` into the EEPROM. Raises `detent.assembler.ImageError` and keeps the old one."""

@@ -26,6 +26,10 @@ class Flow:
         self.jumped = False
         self._marks.clear()
 
+    def rounds(self) -> list[tuple[int, int]]:
+        """The marks, outermost first: the address of the L that owns each, and the rounds begun."""
+        return [(owner, begun) for owner, _, begun in self._marks]
+
     def follow(self, step: Step, inputs: int) -> None:
         """Set `address` to where the program goes after `step`, with the user inputs weighted 1, 2, 4."""
         self.address = step.next

@@ -56,6 +56,10 @@ class Running:
         """Whether the axis seeks the end of travel or home."""
         return self._motion.course in (Course.SEEK_EOT, Course.SEEK_HOME)
 
+    def rounds(self) -> list[tuple[int, int]]:
+        """The loops that the program is in, outermost first: the address of the L, and which round it is."""
+        return self._flow.rounds() if self.busy else []
+
     def run(self, program: Program, now: Ns) -> None:
         """Start `program` at its first instruction. An empty one is done at once."""
         self._program = program

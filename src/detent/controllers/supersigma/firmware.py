@@ -158,6 +158,11 @@ class Supersigma:
         return pins.BUS_FORMAT
 
     @property
+    def straps(self) -> Mapping[str, Level]:
+        """It has none."""
+        return pins.DEFAULT_STRAPS
+
+    @property
     def axes(self) -> Sequence[str]:
         """One axis, without a name."""
         return ("",)
@@ -178,6 +183,19 @@ class Supersigma:
     def answers(self, data: bytes) -> list[str]:
         """The answers in what this drive sent, in words."""
         return link.answers(data)
+
+    def registers(self, now: Ns) -> dict[str, str]:
+        """The step counter and the flags of the status, in words."""
+        flags = [flag.word for flag in link.FLAGS if self._flags & flag.bit]
+        return {"steps": str(self._motion.steps_done(now)), "flags": ", ".join(flags) or "none"}
+
+    def program_memory(self) -> bytes:
+        """It holds no program."""
+        return b""
+
+    def kept_memory(self) -> bytes:
+        """It keeps nothing."""
+        return b""
 
     def restore(self, image: bytes) -> None:
         """There is nothing that could keep an image. Raises ImageError."""

@@ -3,9 +3,11 @@
 import contextlib
 import os
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
+from detent.lines.line import Heard
 from detent.realtime.pace import WallNs
+from detent.uart import Chars
 
 MOST_READ = 256  # bytes taken from a client in one wake-up: a flood leaves time for everybody else
 MOST_WAITING = 4_096  # bytes kept for a client that does not read
@@ -22,7 +24,7 @@ class EndpointLost(OSError):
 class Endpoint(Protocol):
     """Bytes between one line of the cell and whoever is connected. No call ever waits."""
 
-    kind: str  # pty, tcp, serial
+    kind: str  # pty, tcp, rfc2217, serial
     address: str  # what a client connects to
 
     @property
@@ -41,8 +43,8 @@ class Endpoint(Protocol):
     def due(self, wall: WallNs) -> None:
         """It is `deadline`."""
 
-    def receive(self, descriptor: int, wall: WallNs) -> bytes:
-        """`descriptor` has something to read: the bytes for the line, which may be none."""
+    def receive(self, descriptor: int, wall: WallNs) -> Chars:
+        """`descriptor` has something to read: the characters for the line, which may be none."""
 
     def send(self, data: bytes, wall: WallNs) -> None:
         """The host of the line hears `data`."""
@@ -52,6 +54,14 @@ class Endpoint(Protocol):
 
     def close(self) -> None:
         """Let go of everything, remove what was made. May be called twice."""
+
+
+@runtime_checkable
+class Listener(Endpoint, Protocol):
+    """An endpoint whose clients have a format of their own: it is given the characters on the line with their times."""
+
+    def hear(self, heard: Sequence[Heard], wall: WallNs) -> None:
+        """What has reached the host of the line, instead of `send`."""
 
 
 class Outgoing:

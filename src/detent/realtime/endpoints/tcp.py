@@ -8,6 +8,7 @@ from typing import NamedTuple
 from detent.realtime.endpoints.endpoint import MOST_READ, EndpointError, Outgoing
 from detent.realtime.pace import WallNs
 from detent.ticks import SECOND
+from detent.uart import Chars
 
 LINGER: WallNs = SECOND  # a client that has said all it had to say may still wait for the answer
 _BACKLOG = 8
@@ -80,7 +81,7 @@ class TcpPort:
         """The client that has said everything goes."""
         self._leave()
 
-    def receive(self, descriptor: int, wall: WallNs) -> bytes:
+    def receive(self, descriptor: int, wall: WallNs) -> Chars:
         """A new client, or what the client sent."""
         if descriptor == self._listener.fileno():
             self._accept()
@@ -96,7 +97,8 @@ class TcpPort:
             return b""
         if not data:
             self._until = wall + LINGER
-        return data
+            return b""
+        return self._understood(data, wall)
 
     def send(self, data: bytes, wall: WallNs) -> None:
         """Give `data` to the client, if there is one."""
@@ -120,6 +122,13 @@ class TcpPort:
         """Close the port and the connection."""
         self._leave()
         self._listener.close()
+
+    def _understood(self, data: bytes, wall: WallNs) -> Chars:
+        """What the client's bytes are on the line."""
+        return data
+
+    def _begin(self) -> None:
+        """A client was let in."""
 
     def _write(self, data: bytes) -> int:
         return self._client.send(data) if self._client is not None else len(data)
@@ -145,6 +154,7 @@ class TcpPort:
             client.close()  # it is gone already
             return
         self._client, self._peer = client, peer
+        self._begin()
 
     def _leave(self) -> None:
         """The client goes, or is gone."""

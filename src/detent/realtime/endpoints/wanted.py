@@ -5,28 +5,33 @@ from typing import NamedTuple
 
 from detent.realtime.endpoints.endpoint import Endpoint
 from detent.realtime.endpoints.pty import PseudoTerminal
+from detent.realtime.endpoints.rfc2217 import Rfc2217Port
 from detent.realtime.endpoints.serialport import SerialPort
 from detent.realtime.endpoints.tcp import TcpAddress, TcpPort
 from detent.uart import Format
 
+_LISTENING = ("tcp", "rfc2217")  # those that are a HOST:PORT
+
 
 class Wanted(NamedTuple):
-    """An endpoint of some kind, and where: a link or nothing for a pty, HOST:PORT for tcp, a device for serial."""
+    """An endpoint of some kind, and where: a link or nothing for a pty, HOST:PORT for tcp and rfc2217, a device."""
 
     kind: str
     where: str = ""
 
     @classmethod
     def parse(cls, text: str) -> "Wanted":
-        """Read ``pty``, ``pty:LINK``, ``tcp:HOST:PORT`` or ``serial:DEVICE``. Raises ValueError."""
+        """Read pty, pty:LINK, tcp:HOST:PORT, rfc2217:HOST:PORT or serial:DEVICE. Raises ValueError."""
         kind, _, where = text.partition(":")
-        if kind not in ("pty", "tcp", "serial") or (kind != "pty" and not where):
-            raise ValueError(f"{text!r} is no endpoint; write pty, pty:LINK, tcp:HOST:PORT or serial:DEVICE")
+        if kind not in ("pty", *_LISTENING, "serial") or (kind != "pty" and not where):
+            raise ValueError(
+                f"{text!r} is no endpoint; write pty, pty:LINK, tcp:HOST:PORT, rfc2217:HOST:PORT or serial:DEVICE"
+            )
         return cls(kind, where).checked()
 
     def checked(self) -> "Wanted":
         """Itself, if `where` can be understood. Raises ValueError."""
-        if self.kind == "tcp":
+        if self.kind in _LISTENING:
             TcpAddress.parse(self.where)
         return self
 
@@ -37,7 +42,7 @@ class Wanted(NamedTuple):
         """
         if self.kind == "pty" and self.where:
             return self._replace(where=f"{self.where}-{name}")
-        if self.kind == "tcp":
+        if self.kind in _LISTENING:
             address = TcpAddress.parse(self.where)
             port = address.port and address.port + number
             if port > 65535:
@@ -57,5 +62,7 @@ class Wanted(NamedTuple):
                 return PseudoTerminal(Path(self.where) if self.where else None)
             case "tcp":
                 return TcpPort(TcpAddress.parse(self.where), name)
+            case "rfc2217":
+                return Rfc2217Port(TcpAddress.parse(self.where), name, form)
             case _:
                 return SerialPort(self.where, form)

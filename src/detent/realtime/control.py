@@ -1,0 +1,429 @@
+"""A cell that is served, looked at and meddled with: the verbs of `realtime.verbs`, arguments in, answers out.
+
+Nothing here knows who asks. `Control.do` is for the thread that serves; `ask` and `call` are for every other one.
+"""
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import CancelledError, Future
+from concurrent.futures import TimeoutError as TooLate
+from typing import Final
+
+from detent.cell.breakage import Fault, OnLine, StuckPin, StuckSwitch, SupplyDip, WriteFailure, find_pin
+from detent.cell.deeds import Action
+from detent.lines.faults import BitErrors, CableOut, Delay, LineFault, LostCharacters
+from detent.pins import LOW
+from detent.realtime import verbs
+from detent.realtime.picture import as_json, level_of, pins_of, switches_of, time_of, whole_state
+from detent.realtime.service import Service
+from detent.realtime.verbs import Answer, AskedWrongly, Json
+from detent.realtime.waiting import Condition, at_position, at_time
+from detent.ticks import SECOND
+
+PATIENCE: Final = 60.0  # seconds of the wall clock that `wait` and `run-for` wait
+GRACE: Final = 10.0  # seconds in which the loop begins what it is asked
+
+Given = dict[str, object]
+
+
+class Ending(RuntimeError):
+    """The cell is not served any more."""
+
+
+class Control:
+    """The verbs of one `service`, which must be observed."""
+
+    def __init__(self, service: Service) -> None:
+        """Raises ValueError for a service that is not observed."""
+        if service.watched is None or service.watch is None:
+            raise ValueError("the service keeps no watch: make it with observed=True")
+        self._service, self._cell, self._pace = service, service.cell, service.pace
+        self._watched, self._watch = service.watched, service.watch
+        self._lock = threading.Lock()  # over the two that follow
+        self._ended = False
+        self._waited_for: set[Future[Answer]] = set()
+        self._does: Mapping[str, Callable[[Given], Answer | Future[Answer]]] = {
+            "state": self._state,
+            "pins": self._pins,
+            "set": self._set,
+            "release": self._release,
+            "switch": self._switch,
+            "power": self._power,
+            "pause": self._stand,
+            "resume": self._go,
+            "step": self._step,
+            "run-for": self._run_for,
+            "pace": self._change_pace,
+            "type": self._type,
+            "send": self._send,
+            "wait": self._wait,
+            "journal": self._journal,
+            "faults": self._faults,
+            "fault": self._fault,
+            "mend": self._mend,
+        }
+
+    def do(self, verb: str, given: Mapping[str, object]) -> Answer | Future[Answer]:
+        """Do it, now, on the thread that serves. Raises AskedWrongly, and what the cell raises.
+
+        The answer of `wait` and `run-for` is to come: cancel it to wait no longer.
+        """
+        arguments = verbs.verb(verb).read(given)
+        try:
+            answer = self._does[verb](arguments)
+        except (ValueError, KeyError) as error:
+            if isinstance(error, AskedWrongly):
+                raise
+            raise AskedWrongly.of(error) from None
+        self._watched.look()
+        return answer
+
+    def ask(self, verb: str, given: Mapping[str, object]) -> "Future[Answer]":
+        """The same from any thread; cancelled if the cell is not served any more."""
+        promised: Future[Answer] = Future()
+        asked = self._service.ask(lambda: self.do(verb, given))
+
+        def pass_on(done: "Future[Answer]") -> None:
+            if done.cancelled():
+                promised.cancel()
+            elif promised.set_running_or_notify_cancel():
+                error = done.exception()
+                if error is not None:
+                    promised.set_exception(error)
+                else:
+                    promised.set_result(done.result())
+
+        def begun(done: "Future[Answer | Future[Answer]]") -> None:
+            if done.cancelled():
+                promised.cancel()
+                return
+            error = done.exception()
+            if error is not None:
+                if promised.set_running_or_notify_cancel():
+                    promised.set_exception(error)
+                return
+            answer = done.result()
+            if isinstance(answer, Future):
+                later = answer
+                promised.add_done_callback(lambda ended: later.cancel() if ended.cancelled() else None)
+                later.add_done_callback(pass_on)
+            elif promised.set_running_or_notify_cancel():
+                promised.set_result(answer)
+
+        asked.add_done_callback(begun)
+        return promised
+
+    def call(self, verb: str, given: Mapping[str, object]) -> Answer:
+        """The same, and wait for the answer: not on the thread that serves. Raises AskedWrongly, Ending.
+
+        Where the time is over before what is waited for, the answer says ``"reached": false``.
+        """
+        waits = any(parameter is verbs.TIMEOUT for parameter in verbs.verb(verb).parameters)
+        patience = GRACE
+        if waits:
+            timeout = verbs.verb(verb).read(given).get("timeout")
+            patience = timeout / SECOND if isinstance(timeout, int) else PATIENCE
+        with self._lock:
+            if self._ended:
+                raise Ending("the cell is not served any more")
+            promised = self.ask(verb, given)
+            self._waited_for.add(promised)
+        try:
+            return promised.result(patience)
+        except TooLate:
+            promised.cancel()
+        except CancelledError:
+            raise Ending("the cell is not served any more") from None
+        finally:
+            with self._lock:
+                self._waited_for.discard(promised)
+        if waits:
+            return {"reached": False} | self.call("state", {})
+        raise Ending("the cell does not answer")
+
+    def end(self) -> None:
+        """Whoever waits in `call` is told that it ends, and whoever calls from now on. From any thread."""
+        with self._lock:
+            self._ended = True
+            waiting = list(self._waited_for)
+        for promised in waiting:
+            promised.cancel()
+
+    # -- looking -----------------------------------------------------------------------------------------
+
+    def _state(self, _: Given) -> Answer:
+        return {**whole_state(self._service), "faults": self._list_faults()}
+
+    def _pins(self, given: Given) -> Answer:
+        units = [self._unit(given)] if "unit" in given else list(self._cell.wiring.names[: self._cell.wiring.units])
+        return {"time_ns": self._cell.now, "pins": {unit: pins_of(self._service, unit) for unit in units}}
+
+    def _journal(self, given: Given) -> Answer:
+        journal = self._cell.journal
+        last = given.get("last", 100)
+        assert isinstance(last, int)
+        forgotten = getattr(journal, "forgotten", 0)
+        newest = list(journal)[-last:] if last else []
+        return {"deeds": forgotten + len(journal), "complete": not forgotten, "journal": [_told(a) for a in newest]}
+
+    def _faults(self, _: Given) -> Answer:
+        return {"time_ns": self._cell.now, "faults": self._list_faults()}
+
+    def _list_faults(self) -> list[Json]:
+        cell = self._cell
+        listed: list[Json] = []
+        for number, fault in cell.faults.standing.items():
+            found: dict[str, Json] = {"fault": number, **self._describe(fault)}
+            tally = cell.faults.tally(cell, number)
+            if tally is not None:
+                found |= {"met": tally.met, "struck": tally.struck}
+            listed.append(found)
+        return listed
+
+    def _describe(self, fault: Fault) -> dict[str, Json]:
+        match fault:
+            case OnLine(line, what):
+                kind = next(name for name, made in _ON_LINES.items() if made is type(what))
+                return {"kind": kind, "where": self._cell.wiring.line_names[line], **as_json(what)}
+            case StuckSwitch(switch, level):
+                return {"kind": "stuck", "where": switch, "level": level}
+            case StuckPin(unit, pin, level):
+                return {"kind": "stuck", "where": f"{unit}.{pin}", "level": level}
+            case WriteFailure(unit, times):
+                return {"kind": "eeprom", "where": unit, "times": times}
+            case SupplyDip(unit):
+                return {"kind": "dip", "where": unit}
+
+    # -- hands -------------------------------------------------------------------------------------------
+
+    def _set(self, given: Given) -> Answer:
+        unit, pin = self._pin(given)
+        self._cell.set_pin(unit, pin, _level(given))
+        return self._now()
+
+    def _release(self, given: Given) -> Answer:
+        unit, pin = self._pin(given)
+        self._cell.release(unit, pin)
+        return self._now()
+
+    def _switch(self, given: Given) -> Answer:
+        known = switches_of(self._service)
+        name = str(given["switch"])
+        if name not in known:
+            raise verbs.unknown("switch", name, list(known))
+        if name not in self._cell.wiring.names:
+            raise AskedWrongly(f"{name} is moved by a rotor", f"let it stick: fault {name} stuck")
+        self._cell.set_switch(name, _level(given))
+        return self._now()
+
+    def _power(self, given: Given) -> Answer:
+        self._cell.power(self._unit(given), bool(given["on"]))
+        return self._now()
+
+    def _type(self, given: Given) -> Answer:
+        unit = self._unit(given)
+        self._cell.type(unit, str(given["text"]))
+        return self._now()
+
+    def _send(self, given: Given) -> Answer:
+        try:
+            data = str(given["data"]).encode("latin-1").decode("unicode_escape").encode("latin-1")
+        except UnicodeError:
+            raise AskedWrongly("data has characters that are no bytes", r"write them like \r or \x1b") from None
+        self._cell.send(self._line(given.get("line")), data)
+        return self._now()
+
+    # -- time --------------------------------------------------------------------------------------------
+
+    def _now(self) -> Answer:
+        return time_of(self._service)
+
+    def _stand(self, _: Given) -> Answer:
+        if not self._pace.held:
+            self._pace.hold(self._cell.now)
+        return self._now()
+
+    def _go(self, _: Given) -> Answer:
+        if self._pace.held:
+            self._pace.go(self._cell.now)
+        return self._now()
+
+    def _step(self, given: Given) -> Answer:
+        cell = self._cell
+        time = given.get("time")
+        if isinstance(time, int):
+            cell.run_to(cell.now + time)
+        else:
+            cell.step()
+        self._pace.hold(cell.now)
+        return self._now()
+
+    def _run_for(self, given: Given) -> "Future[Answer]":
+        time = given["time"]
+        assert isinstance(time, int)
+        reached = self._watched.wait([at_time(self._cell, self._cell.now + time)], self._reached_and_stand)
+        self._go({})
+        return reached
+
+    def _reached(self) -> Answer:
+        return {"reached": True, **self._now()}
+
+    def _reached_and_stand(self) -> Answer:
+        self._stand({})
+        return self._reached()
+
+    def _change_pace(self, given: Given) -> Answer:
+        pace = given["pace"]
+        assert pace is None or isinstance(pace, float)
+        held = self._pace.held
+        self._pace.change(pace, self._cell.now)
+        assert self._pace.held == held
+        return self._now()
+
+    def _wait(self, given: Given) -> "Future[Answer]":
+        cell = self._cell
+        conditions: list[Condition] = []
+        if "state" in given:
+            unit = self._unit(given)
+            words = [word.strip() for word in str(given["state"]).split(",")]
+            axis = self._axis(unit, given)
+            conditions.append(Condition(lambda: cell.controller(unit).status(cell.now, axis).state in words))
+        if "position" in given:
+            unit, position = self._unit(given), given["position"]
+            assert isinstance(position, int)
+            conditions.append(at_position(cell, self._watch, unit, self._axis(unit, given), position))
+        if "pin" in given:
+            name, text = self._pin(given, outputs=True)
+            level = given.get("level", LOW)
+            pin = find_pin(cell.parts[cell.unit(name)].pins, text)
+            assert pin is not None
+            conditions.append(Condition(lambda: level_of(self._service, name, pin) == level))
+        elif "level" in given:
+            raise AskedWrongly("wait: a level of what", "name the pin too")
+        if isinstance(time := given.get("time"), int):
+            conditions.append(at_time(cell, time))
+        if not conditions:
+            raise AskedWrongly("wait: for what", "name a state, a position, a pin with its level, or a time")
+        reached = self._watched.wait(conditions, self._reached_and_stand if given.get("pause") else self._reached)
+        if given.get("resume") and not reached.done():
+            self._go({})
+        return reached
+
+    # -- faults ------------------------------------------------------------------------------------------
+
+    def _fault(self, given: Given) -> Answer:
+        kind = str(given["kind"])
+        if kind not in verbs.FAULTS:
+            raise verbs.unknown("kind of fault", kind, tuple(verbs.FAULTS))
+        takes = verbs.FAULTS[kind].takes
+        for name in given:
+            if name not in ("where", "kind", "for", *takes):
+                raise AskedWrongly(f"a fault {kind} takes no {name}", f"it takes: {', '.join((*takes, 'for'))}")
+        lasting = given.get("for")
+        assert lasting is None or isinstance(lasting, int)
+        number = self._cell.breaks(self._broken(kind, str(given["where"]), given), lasting)
+        return {"fault": number, **self._now()}
+
+    def _broken(self, kind: str, where: str, given: Given) -> Fault:
+        """The fault that is meant. Raises AskedWrongly."""
+        options = {name: value for name, value in given.items() if name in verbs.FAULTS[kind].takes}
+        if kind in _ON_LINES:
+            if kind == "delay" and "by" not in options:
+                raise AskedWrongly("by how much do characters come later", "give by, a time")
+            fault: LineFault = _ON_LINES[kind](**options)  # type: ignore[arg-type]
+            return OnLine(self._line(None if where == "line" else where), fault)
+        if kind == "stuck":
+            if "level" not in options:
+                raise AskedWrongly(f"where is {where} stuck", "give level: 0, 1, low or high")
+            if where in switches_of(self._service):
+                return StuckSwitch(where, _level(given))
+            if "." not in where and len(self._units) > 1:
+                raise verbs.unknown("switch", where, [*switches_of(self._service), "UNIT.PIN"])
+            return StuckPin(*self._pin({"pin": where}), _level(given))
+        unit = self._unit({"unit": where})
+        return SupplyDip(unit) if kind == "dip" else WriteFailure(unit, **options)  # type: ignore[arg-type]
+
+    def _mend(self, given: Given) -> Answer:
+        number = given.get("fault")
+        standing = list(self._cell.faults.standing)
+        if number is None:
+            numbers = standing
+        elif number in standing:
+            assert isinstance(number, int)
+            numbers = [number]
+        else:
+            raise verbs.unknown("fault", str(number), [str(known) for known in standing])
+        for one in numbers:
+            self._cell.mend(one)
+        mended: list[Json] = list(numbers)
+        return {"mended": mended, **self._now()}
+
+    # -- names -------------------------------------------------------------------------------------------
+
+    @property
+    def _units(self) -> Sequence[str]:
+        return self._cell.wiring.names[: self._cell.wiring.units]
+
+    def _unit(self, given: Mapping[str, object]) -> str:
+        """The unit that is named; the only one, if none is."""
+        name = given.get("unit")
+        if name is None:
+            if len(self._units) > 1:
+                raise AskedWrongly("which unit", f"name one of: {', '.join(self._units)}")
+            return self._units[0]
+        if name not in self._units:
+            raise verbs.unknown("unit", str(name), self._units)
+        return str(name)
+
+    def _axis(self, unit: str, given: Given) -> str:
+        if unit not in self._cell.controllers():
+            raise AskedWrongly(f"{unit} moves no axis", f"name one of: {', '.join(self._cell.controllers())}")
+        axes = self._cell.controller(unit).axes
+        axis = given.get("axis", axes[0])
+        if axis not in axes:
+            raise verbs.unknown(f"axis of {unit}", str(axis), axes)
+        return str(axis)
+
+    def _pin(self, given: Given, *, outputs: bool = False) -> tuple[str, str]:
+        """The unit and the pin that UNIT.PIN, or PIN of the only unit, names: an input, or an output too."""
+        text = str(given["pin"])
+        unit, dot, pin = text.rpartition(".")
+        unit = self._unit({"unit": unit} if dot else given)
+        pins = self._cell.parts[self._cell.unit(unit)].pins
+        known = [other.name for other in pins if other.kind.reads or (outputs and other.kind.drives)]
+        if pin not in known:
+            raise verbs.unknown(f"{'pin' if outputs else 'input'} of {unit}", pin, known)
+        return unit, pin
+
+    def _line(self, name: object) -> int:
+        """The line that is named, itself or by a unit on it; the only one, if none is."""
+        wiring = self._cell.wiring
+        names = wiring.line_names
+        if name is None:
+            if len(names) > 1:
+                raise AskedWrongly("which line", f"name one of: {', '.join(names)}")
+            return 0
+        if name in names:
+            return names.index(str(name))
+        if name in self._units and wiring.line_of[self._units.index(str(name))] >= 0:
+            return wiring.line_of[self._units.index(str(name))]
+        raise verbs.unknown("line", str(name), names)
+
+
+_ON_LINES: Final[Mapping[str, type[BitErrors | LostCharacters | Delay | CableOut]]] = {
+    "bit-errors": BitErrors,
+    "lost": LostCharacters,
+    "delay": Delay,
+    "cable-out": CableOut,
+}
+
+
+def _level(given: Given) -> int:
+    level = given["level"]
+    assert isinstance(level, int)
+    return level
+
+
+def _told(action: Action) -> Json:
+    """An entry of the journal."""
+    return {"at_ns": action.at, "deed": type(action.deed).__name__, **as_json(action.deed)}

@@ -1,0 +1,182 @@
+"""A cell that is served, as plain data: its time, units, pins, lines, switches, motors and recent events."""
+
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
+
+from detent.cell.breakage import StuckPin, StuckSwitch, contact
+from detent.cell.cell import Cell
+from detent.cell.mechanics import Mechanics
+from detent.cell.switches import Switch
+from detent.controllers.device import Powered, Refused
+from detent.pins import Level, Pin, PinKind
+from detent.realtime.service import Service
+from detent.realtime.verbs import Answer, Json
+from detent.realtime.watch import Event, Watch
+
+F = TypeVar("F", StuckPin, StuckSwitch)
+
+
+def time_of(service: Service) -> Answer:
+    """The time of the cell, and whether it stands."""
+    pace = service.pace
+    factor = None if pace.free else float(pace.factor)
+    return {"time_ns": service.cell.now, "paused": pace.held, "pace": factor}
+
+
+def whole_state(service: Service) -> Answer:
+    """Everything but the faults."""
+    cell, late = service.cell, service.lateness()
+    names = cell.wiring.names[: cell.wiring.units]
+    return {
+        **time_of(service),
+        "late_ns": {"deadlines": late.deadlines, "p50": late.p50, "p99": late.p99, "most": late.most},
+        "units": {name: unit_state(service, name) for name in names},
+        "lines": {name: _line(service, number) for number, name in enumerate(cell.wiring.line_names)},
+        "switches": switches_of(service),
+        "motors": {
+            cell.wiring.names[n]: _motor(cell, part) for n, part in enumerate(cell.parts) if isinstance(part, Mechanics)
+        },
+        "events": _events(service),
+    }
+
+
+def unit_state(service: Service, name: str) -> Answer:
+    """How a unit stands."""
+    cell, watch = service.cell, _watch(service)
+    index = cell.unit(name)
+    seen = watch.of_unit[index]
+    found: Answer = {
+        "model": service.description.units[name].model,
+        "powered": cell.supplied(index),
+        "pins": {
+            pin.name: level_of(service, name, pin)
+            for pin in cell.parts[index].pins
+            if pin.kind.drives or pin.kind.reads
+        },
+        "received": seen.received,
+        "sent": seen.sent,
+        "said": bytes(value & 0xFF for value in seen.said).decode("latin-1"),
+        "refused": None if seen.refused is None else as_json(seen.refused),
+    }
+    if name not in cell.controllers():
+        return found
+    controller = cell.controller(name)
+    axes: dict[str, Json] = {}
+    for axis in controller.axes:
+        status, motion = controller.status(cell.now, axis), seen.motions.get(axis)
+        rate = 0.0 if motion is None else motion.direction * motion.train.state_at(cell.now).rate
+        axes[axis] = {"position": status.position, "pulses": status.pulses, "rate": rate, "state": status.state}
+    return found | {
+        "state": controller.status(cell.now).state,
+        "axes": axes,
+        "executing": None if seen.executing is None else as_json(seen.executing),
+        "image_bytes": len(controller.kept_memory()),
+    }
+
+
+def pins_of(service: Service, name: str) -> dict[str, dict[str, Json]]:
+    """The inputs, straps and outputs of a unit; the level is None where an output is let go, or nobody has asked."""
+    cell = service.cell
+    index, stuck = cell.unit(name), {f.pin for f in _faults(cell, StuckPin) if f.unit == name}
+    return {
+        pin.name: {
+            "level": level_of(service, name, pin),
+            "kind": pin.kind.value,
+            "wired": (cell.net_driven if pin.kind.drives else cell.net_read)(index, pin.name) is not None,
+            "stuck": pin.name in stuck,
+        }
+        for pin in cell.parts[index].pins
+        if pin.kind.drives or pin.kind.reads
+    }
+
+
+def level_of(service: Service, name: str, pin: Pin) -> Level | None:
+    """The level of a pin of a unit; None where an output is let go, or nobody has asked."""
+    cell = service.cell
+    index = cell.unit(name)
+    seen = _watch(service).of_unit[index]
+    if pin.kind.drives:
+        return seen.outputs.get(pin.name)
+    if pin.name in seen.inputs:
+        return seen.inputs[pin.name]
+    if (net := cell.net_read(index, pin.name)) is not None:
+        return cell.nets[net].level
+    return pin.rest if pin.kind is PinKind.INPUT else service.straps[name].get(pin.name, pin.rest)
+
+
+def switches_of(service: Service) -> dict[str, Json]:
+    """The contacts of the cell: the level that each gives, and whether it is stuck there."""
+    cell = service.cell
+    names = dict.fromkeys(service.description.switches)
+    names |= dict.fromkeys(n for n, part in zip(cell.wiring.names, cell.parts, strict=True) if isinstance(part, Switch))
+    stuck = {fault.switch: fault.level for fault in _faults(cell, StuckSwitch)}
+    found: dict[str, Json] = {}
+    for name in names:
+        part, pin = contact(cell, name)
+        net = cell.net_driven(part, pin)
+        level = None if net is None else cell.nets[net].levels.get((part, pin))
+        found[name] = {"level": stuck.get(name, level), "stuck": name in stuck}
+    return found
+
+
+def as_json(record: object) -> dict[str, Json]:
+    """A named tuple as a table; bytes and characters become text, one character a byte. Tuples within it are tables."""
+    assert isinstance(record, tuple)
+    fields: Mapping[str, object] = record._asdict()  # type: ignore[attr-defined]
+    return {name: _value(value) for name, value in fields.items()}
+
+
+def _value(value: object) -> Json:
+    if isinstance(value, bytes):
+        return value.decode("latin-1")
+    if isinstance(value, tuple) and hasattr(value, "_asdict"):
+        return {"kind": type(value).__name__, **as_json(value)}
+    if isinstance(value, (list, tuple)):
+        return [_value(item) for item in value]
+    assert value is None or isinstance(value, (str, int, float, bool))
+    return value
+
+
+def _watch(service: Service) -> Watch:
+    assert service.watch is not None
+    return service.watch
+
+
+def _faults(cell: Cell, kind: type[F]) -> Sequence[F]:
+    return [fault for fault in cell.faults.standing.values() if isinstance(fault, kind)]
+
+
+def _line(service: Service, number: int) -> Answer:
+    cell, watch = service.cell, _watch(service)
+    line, units = cell.lines[number], [unit for unit, _ in cell.wiring.lines[number]]
+    return {
+        "format": str(line.format),
+        "units": [cell.wiring.names[unit] for unit in units],
+        "endpoints": [f"{kind} {address}" for at, kind, address in service.addresses() if at == number],
+        "received": max(watch.of_unit[unit].received for unit in units),
+        "sent": sum(watch.of_unit[unit].sent for unit in units),
+    }
+
+
+def _motor(cell: Cell, motor: Mechanics) -> Answer:
+    rotor = motor.rotor_at(cell.now)
+    return {"place": float(motor.place_of(rotor.angle)), "command": motor.command(cell.now), "rad_per_s": rotor.speed}
+
+
+def _events(service: Service) -> list[Json]:
+    """The newest, in order of time: what was refused, supplies, images, characters that faults have changed."""
+    cell = service.cell
+    found = [(event.at, cell.wiring.names[unit], _event(event)) for unit, event in _watch(service).events]
+    for number, strike in cell.faults.strikes(cell):
+        told = as_json(strike) | {"event": "lost" if strike.after is None else "damaged"}
+        found.append((strike.at, cell.wiring.line_names[number], told))
+    found.sort(key=lambda event: event[0])
+    return [{"where": where, **told} for _, where, told in found]
+
+
+def _event(event: Event) -> dict[str, Json]:
+    if isinstance(event, Refused):
+        return {"event": "refused", **as_json(event)}
+    if isinstance(event, Powered):
+        return {"event": "on" if event.on else "off", "at": event.at}
+    return {"event": "image", "at": event.at, "bytes": len(event.image)}

@@ -1,0 +1,131 @@
+"""Waiting for something in a cell that is served, without looking again and again.
+
+`Watched` stands between the loop and the cell. It looks at what is waited for after each eventful instant, and makes
+instants of its own where a pulse brings an axis to a place or a time comes; so a cell can be let stand exactly there.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from typing import NamedTuple
+
+from detent.cell.cell import Cell
+from detent.lines.line import Line
+from detent.realtime.pace import Pace
+from detent.realtime.verbs import Answer
+from detent.realtime.watch import Watch
+from detent.ticks import NEVER, Ns
+from detent.uart import Chars
+
+
+class Condition(NamedTuple):
+    """Something that is so or not so at an instant; `next` is when it must be looked at even if nothing happens."""
+
+    holds: Callable[[], bool]
+    next: Callable[[], Ns] = lambda: NEVER
+
+
+class _Waiter(NamedTuple):
+    conditions: Sequence[Condition]
+    then: Callable[[], None]
+    future: "Future[Answer]"
+
+    def over(self) -> bool:
+        """Look whether it is so, and tell whoever waits; whether nobody waits any more."""
+        if self.future.cancelled():
+            return True
+        if not all(condition.holds() for condition in self.conditions):
+            return False
+        if self.future.set_running_or_notify_cancel():
+            self.then()
+        return True
+
+
+class Watched:
+    """The cell as the loop serves it. It stands when its pace is held, also in the middle of catching up."""
+
+    def __init__(self, cell: Cell, pace: Pace) -> None:
+        self.cell, self._pace = cell, pace
+        self._waiters: list[_Waiter] = []
+
+    @property
+    def now(self) -> Ns:
+        """The time of the cell."""
+        return self.cell.now
+
+    @property
+    def lines(self) -> Sequence[Line]:
+        """Its lines."""
+        return self.cell.lines
+
+    def next_event(self) -> Ns | None:
+        """When something happens, or must be looked at; nothing does while it stands."""
+        if self._pace.held:
+            return None
+        at = self.cell.next_event()
+        if self._waiters:
+            alarm = min(condition.next() for waiter in self._waiters for condition in waiter.conditions)
+            if alarm < (NEVER if at is None else at):
+                return max(alarm, self.cell.now)
+        return at
+
+    def run_to(self, until: Ns) -> None:
+        """Let everything happen up to `until`, one eventful instant at a time."""
+        if not self._pace.held:
+            self.cell.run_to(until)
+            self.look()
+
+    def send(self, line: int, data: Chars) -> None:
+        """The host of a line sends something."""
+        self.cell.send(line, data)
+        self.look()
+
+    def wait(self, conditions: Sequence[Condition], then: Callable[[], Answer]) -> "Future[Answer]":
+        """Call `then` at the first instant at which all conditions hold, which may be this one; its answer."""
+        future: Future[Answer] = Future()
+
+        def tell() -> None:
+            try:
+                future.set_result(then())
+            except Exception as error:  # whoever waits is told
+                future.set_exception(error)
+
+        waiter = _Waiter(conditions, tell, future)
+        if not waiter.over():
+            self._waiters.append(waiter)
+        return future
+
+    def look(self) -> None:
+        """Look at everything that is waited for."""
+        if self._waiters:
+            self._waiters = [waiter for waiter in self._waiters if not waiter.over()]
+
+    def close(self) -> None:
+        """Nobody needs to wait any longer."""
+        for waiter in self._waiters:
+            waiter.future.cancel()
+        self._waiters = []
+
+
+def at_position(cell: Cell, watch: Watch, unit: str, axis: str, position: int) -> Condition:
+    """The axis of a unit is at a position. The pulse that brings it there is an instant to look at."""
+    controller, watched = cell.controller(unit), watch.of_unit[cell.unit(unit)]
+
+    def holds() -> bool:
+        return controller.status(cell.now, axis).position == position
+
+    def following() -> Ns:
+        motion = watched.motions.get(axis)
+        if motion is None:
+            return NEVER
+        missing = (position - controller.status(cell.now, axis).position) * motion.direction
+        pulse = max(motion.train.steps_by(cell.now), motion.first - 1) + missing
+        if missing <= 0 or (motion.train.steps is not None and pulse > motion.train.steps):
+            return NEVER
+        return motion.train.time_of(pulse)
+
+    return Condition(holds, following)
+
+
+def at_time(cell: Cell, time: Ns) -> Condition:
+    """The time of the cell has come."""
+    return Condition(lambda: cell.now >= time, lambda: time if cell.now < time else NEVER)

@@ -1,0 +1,322 @@
+import threading
+from collections.abc import Iterator
+from concurrent.futures import CancelledError
+from typing import Any
+
+import pytest
+from tests.realtime.controlled import controlled, no_file, one, slide
+
+from detent.cell.cell import Cell
+from detent.realtime import verbs
+from detent.realtime.control import Control, Ending
+from detent.realtime.service import Service
+from detent.realtime.verbs import AskedWrongly, Verb
+from detent.realtime.watch import MOST_EVENTS, Lately
+from detent.ticks import MS
+
+
+@pytest.fixture
+def cell() -> Iterator[Control]:
+    with controlled(slide()) as control:
+        yield control
+
+
+def unit(control: Control, name: str) -> dict[str, Any]:
+    units: Any = control.call("state", {})["units"]
+    found: dict[str, Any] = units[name]
+    return found
+
+
+def test_a_service_that_is_not_observed_has_no_control_and_keeps_nothing() -> None:
+    with Service(one(), no_file) as service:
+        assert type(service.cell) is Cell
+        assert service.cell.recording is None
+        assert service.watched is None
+        with pytest.raises(ValueError, match="make it with observed=True"):
+            Control(service)
+
+
+def test_the_state_tells_everything(cell: Control) -> None:
+    state: Any = cell.call("state", {})
+    assert state["paused"] is False
+    assert state["pace"] is None
+    assert set(state["units"]) == {"slide", "other", "watch"}
+    assert state["units"]["slide"]["model"] == "gs-c200"
+    assert state["units"]["slide"]["state"] == "ready"
+    assert state["units"]["slide"]["axes"] == {"": {"position": 0, "pulses": 0, "rate": 0.0, "state": "ready"}}
+    assert state["units"]["slide"]["pins"]["CHS"] == 0
+    assert state["units"]["slide"]["pins"]["BR0"] == 0, "a strap that was left open has its default"
+    assert state["units"]["slide"]["pins"]["RDY"] == 1
+    assert state["lines"]["slide"]["format"] == "9600 7O2"
+    assert state["lines"]["slide"]["endpoints"][0].startswith("pty /dev/")
+    assert state["switches"] == {"sensor": {"level": 1, "stuck": False}, "hand": {"level": 1, "stuck": False}}
+    assert state["faults"] == []
+    assert [event["event"] for event in state["events"]] == ["on"] * 3
+
+
+def test_a_cell_is_stopped_at_the_pulse_that_brings_its_axis_to_a_place(cell: Control) -> None:
+    cell.call("pause", {})
+    cell.call("type", {"unit": "slide", "text": "+1000"})
+    told = cell.call("wait", {"unit": "slide", "position": 417, "resume": True, "pause": True})
+    assert told["reached"] is True
+    assert told["paused"] is True
+    axis = unit(cell, "slide")["axes"][""]
+    assert axis["position"] == 417
+    assert axis["rate"] > 0
+    cell.call("wait", {"unit": "slide", "state": "ready", "resume": True})
+    assert unit(cell, "slide")["axes"][""]["position"] == 1000
+
+
+def test_one_waits_for_a_level_and_for_all_that_is_named_at_once(cell: Control) -> None:
+    cell.call("pause", {})
+    cell.call("type", {"unit": "slide", "text": "A1"})
+    cell.call("wait", {"pin": "other.UI1", "level": "high", "resume": True})
+    cell.call("pause", {})
+    cell.call("type", {"unit": "slide", "text": "+100"})
+    cell.call("wait", {"unit": "slide", "state": "running", "pin": "slide.UI1", "resume": True, "pause": True})
+    assert unit(cell, "slide")["axes"][""]["position"] == 50, "the pulse that closes the sensor"
+
+
+def test_one_waits_for_a_time_of_the_cell(cell: Control) -> None:
+    told = cell.call("wait", {"time": "3 s", "pause": True})
+    assert told["time_ns"] == 3_000_000_000
+
+
+def test_what_does_not_come_in_time_is_told_with_the_state(cell: Control) -> None:
+    told = cell.call("wait", {"unit": "slide", "position": 5, "timeout": "1 ms"})
+    assert told["reached"] is False
+    assert "units" in told
+
+
+def test_a_cell_that_stands_goes_on_step_by_step_and_for_a_time(cell: Control) -> None:
+    began = cell.call("pause", {})["time_ns"]
+    assert isinstance(began, int)
+    cell.call("type", {"unit": "slide", "text": "V1"})
+    first = cell.call("step", {})["time_ns"]
+    second = cell.call("step", {})["time_ns"]
+    assert isinstance(first, int)
+    assert isinstance(second, int)
+    assert began < first < second
+    third = cell.call("step", {"time": "5 ms"})
+    assert third["time_ns"] == second + 5 * MS
+    last = cell.call("run-for", {"time": 0.02})
+    assert last["time_ns"] == second + 25 * MS
+    assert last["paused"] is True
+    assert cell.call("resume", {})["paused"] is False
+
+
+def test_a_change_of_pace_leaves_a_cell_that_stands_where_it_is(cell: Control) -> None:
+    now = cell.call("pause", {})["time_ns"]
+    assert cell.call("pace", {"pace": 3}) == {"time_ns": now, "paused": True, "pace": 3.0}
+    assert cell.call("pace", {"pace": "free"})["pace"] is None
+    with pytest.raises(AskedWrongly, match="would not go forward"):
+        cell.call("pace", {"pace": 0})
+
+
+def test_inputs_are_set_and_released(cell: Control) -> None:
+    cell.call("set", {"pin": "slide.UI3", "level": "low"})
+    pins: Any = cell.call("pins", {"unit": "slide"})["pins"]
+    assert pins["slide"]["UI3"] == {"level": 0, "kind": "input", "wired": False, "stuck": False}
+    cell.call("release", {"pin": "slide.UI3"})
+    pins = cell.call("pins", {})["pins"]
+    assert pins["slide"]["UI3"]["level"] == 1
+    assert set(pins) == {"slide", "other", "watch"}
+
+
+def test_switches_and_supplies_are_switched(cell: Control) -> None:
+    cell.call("switch", {"switch": "hand", "level": 0})
+    assert unit(cell, "slide")["pins"]["UI2"] == 0
+    cell.call("power", {"unit": "slide", "on": "off"})
+    off = unit(cell, "slide")
+    assert (off["powered"], off["state"], off["pins"]["RDY"]) == (False, "off", None)
+    cell.call("power", {"unit": "slide", "on": True})
+    assert unit(cell, "slide")["state"] == "ready"
+
+
+def test_what_is_refused_is_told_with_the_reason(cell: Control) -> None:
+    """Datasheet, error codes: E3, an argument that is not allowed."""
+    cell.call("type", {"unit": "slide", "text": "U9"})
+    cell.call("wait", {"time": 1})
+    slide = unit(cell, "slide")
+    assert slide["refused"]["frame"] == "U9"
+    assert slide["said"].startswith("E")
+    assert slide["received"] == 3
+
+
+def test_characters_are_sent_as_they_are_written(cell: Control) -> None:
+    cell.call("send", {"line": "slide", "data": r"V1\r"})
+    cell.call("wait", {"time": 1})
+    assert unit(cell, "slide")["said"] == "V0\r"
+
+
+def test_faults_tell_what_they_have_struck(cell: Control) -> None:
+    assert cell.call("fault", {"where": "slide", "kind": "lost", "towards": "host", "nth": 1})["fault"] == 1
+    cell.call("type", {"unit": "slide", "text": "V1"})
+    cell.call("wait", {"time": 1})
+    faults: Any = cell.call("faults", {})["faults"]
+    assert faults == [
+        {"fault": 1, "kind": "lost", "where": "slide", "towards": "host", "rate": 0.0, "nth": 1, "seed": 0,
+         "met": 3, "struck": 1}
+    ]  # fmt: skip
+    events: Any = cell.call("state", {})["events"]
+    assert (events[-1]["event"], events[-1]["before"]["value"]) == ("lost", ord("V"))
+    assert cell.call("mend", {"fault": 1})["mended"] == [1]
+    assert cell.call("faults", {})["faults"] == []
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        {"where": "slide", "kind": "bit-errors", "rate": 0.5, "bit": "3", "towards": "units", "seed": 4},
+        {"where": "slide", "kind": "lost", "nth": 7},
+        {"where": "slide", "kind": "delay", "by": "20 ms"},
+        {"where": "slide", "kind": "cable-out", "for": "1 s"},
+        {"where": "sensor", "kind": "stuck", "level": "low"},
+        {"where": "slide.UI3", "kind": "stuck", "level": 0},
+        {"where": "slide", "kind": "eeprom", "times": 3},
+        {"where": "slide", "kind": "dip", "for": 0.001},
+    ],
+)
+def test_every_kind_of_fault_is_told_as_it_was_asked_and_is_mended(cell: Control, fault: dict[str, object]) -> None:
+    cell.call("pause", {})
+    cell.call("fault", fault)
+    (told,) = cell.call("faults", {})["faults"]  # type: ignore[misc, union-attr]
+    assert isinstance(told, dict)
+    assert (told["kind"], told["where"]) == (fault["kind"], fault["where"])
+    pins: Any = cell.call("pins", {"unit": "slide"})["pins"]
+    stuck = {name for name, pin in pins["slide"].items() if pin["stuck"]}
+    assert stuck == ({"UI3"} if fault["where"] == "slide.UI3" else set())
+    cell.call("mend", {})
+    assert cell.call("faults", {})["faults"] == []
+
+
+def test_every_kind_of_fault_can_be_asked_for() -> None:
+    assert set(verbs.FAULTS) == {"bit-errors", "lost", "delay", "cable-out", "stuck", "eeprom", "dip"}
+
+
+def test_the_journal_tells_what_was_done(cell: Control) -> None:
+    cell.call("pause", {})
+    cell.call("switch", {"switch": "hand", "level": 0})
+    cell.call("fault", {"where": "hand", "kind": "stuck", "level": 1})
+    told: Any = cell.call("journal", {})
+    assert told["complete"] is True
+    assert [entry["deed"] for entry in told["journal"]] == ["SetSwitch", "Break"]
+    assert told["journal"][1]["fault"] == {"kind": "StuckSwitch", "switch": "hand", "level": 1}
+    assert len(cell.call("journal", {"last": 1})["journal"]) == 1  # type: ignore[arg-type]
+
+
+def test_a_long_journal_forgets_its_beginning_and_counts_it() -> None:
+    log: Lately[int] = Lately(10)
+    for n in range(100):
+        log.append(n)
+    assert list(log)[-10:] == list(range(90, 100))
+    assert log.forgotten + len(log) == 100
+    assert len(log) <= 20
+
+
+def test_events_take_no_room_without_end(cell: Control) -> None:
+    cell.call("pause", {})
+    for _ in range(MOST_EVENTS):
+        cell.call("power", {"unit": "slide", "on": False})
+        cell.call("power", {"unit": "slide", "on": True})
+    assert len(cell.call("state", {})["events"]) == MOST_EVENTS  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("verb", "given", "says"),
+    [
+        ("stat", {}, "no verb 'stat'; did you mean state?"),
+        ("state", {"unit": "a"}, "state takes no arguments; leave out unit"),
+        ("pins", {"unt": "slide"}, "no argument of pins 'unt'; did you mean unit?"),
+        ("pins", {"unit": "slid"}, "no unit 'slid'; did you mean slide?"),
+        ("set", {"pin": "slide.UI3"}, "set: level is missing; it is the level"),
+        ("set", {"pin": "slide.UI3", "level": 2}, "level cannot be 2; it takes 0, 1, low or high"),
+        ("set", {"pin": "slide.UI4", "level": 1}, "no input of slide 'UI4'; did you mean UI"),
+        ("set", {"pin": "slide.UO1", "level": 1}, "no input of slide 'UO1'"),
+        ("set", {"pin": "UI3", "level": 1}, "which unit; name one of: slide, other, watch"),
+        ("release", {"pin": "slide.CHS"}, "slide.CHS is a strap; set it to the level that it is tied to"),
+        ("switch", {"switch": "hnd", "level": 1}, "no switch 'hnd'; did you mean hand?"),
+        ("type", {"text": "V1"}, "which unit"),
+        ("type", {"text": "V1", "unit": "watch"}, "unit 'watch' is on no line"),
+        ("send", {"data": "\u20ac", "line": "slide"}, "data has characters that are no bytes"),
+        ("send", {"data": "x"}, "which line; name one of: slide, other"),
+        ("run-for", {"time": "soon"}, "time cannot be 'soon'; it takes seconds, or a time like"),
+        ("wait", {}, "wait: for what; name a state"),
+        ("wait", {"level": 1}, "wait: a level of what; name the pin too"),
+        ("wait", {"unit": "watch", "position": 3}, "watch moves no axis; name one of: slide, other"),
+        ("wait", {"unit": "slide", "position": 3, "axis": "X"}, "no axis of slide 'X'"),
+        ("wait", {"unit": "slide", "position": True}, "position cannot be True; it takes a whole number"),
+        ("fault", {"where": "slide", "kind": "bit-eror"}, "no kind of fault 'bit-eror'; did you mean bit-errors?"),
+        ("fault", {"where": "slide", "kind": "dip", "rate": 1}, "a fault dip takes no rate; it takes: for"),
+        ("fault", {"where": "slide", "kind": "dip"}, "a supply dip ends by itself; say how long it lasts, or"),
+        ("fault", {"where": "slid", "kind": "lost", "nth": 1}, "no line 'slid'; did you mean slide?"),
+        ("fault", {"where": "slide", "kind": "lost"}, "say which characters are struck; either a rate"),
+        ("fault", {"where": "slide", "kind": "delay"}, "by how much do characters come later; give by"),
+        ("fault", {"where": "sensr", "kind": "stuck", "level": 1}, "no switch 'sensr'; did you mean sensor?"),
+        ("fault", {"where": "sensor", "kind": "stuck"}, "where is sensor stuck; give level"),
+        ("fault", {"where": "slide", "kind": "cable-out", "for": 0}, "a fault lasts for a time above 0"),
+        ("mend", {"fault": 9}, "no fault '9'"),
+    ],
+)
+def test_a_wrong_request_says_what_to_do(cell: Control, verb: str, given: dict[str, object], says: str) -> None:
+    with pytest.raises(AskedWrongly) as caught:
+        cell.call(verb, given)
+    assert says in str(caught.value)
+    assert cell.call("journal", {})["deeds"] == 0
+
+
+def test_every_verb_of_the_table_is_done(cell: Control) -> None:
+    assert set(cell._does) == set(verbs.VERBS)
+
+
+@pytest.mark.parametrize("verb", verbs.VERBS.values(), ids=lambda verb: verb.name)
+def test_the_table_is_in_order(verb: Verb) -> None:
+    names = [parameter.name for parameter in verb.parameters]
+    assert len(set(names)) == len(names)
+    required = [parameter.required for parameter in verb.parameters]
+    assert required == sorted(required, reverse=True), "what may be left out stands behind what may not"
+
+
+def test_whoever_waits_when_it_ends_is_told() -> None:
+    with controlled(one()) as control:
+        caught: list[BaseException] = []
+
+        def wait() -> None:
+            try:
+                control.call("wait", {"position": 99})
+            except Ending as error:
+                caught.append(error)
+
+        waiting = threading.Thread(target=wait)
+        waiting.start()
+        while not control._waited_for:
+            control.ask("state", {}).result()
+        control.end()
+        waiting.join()
+        assert "not served any more" in str(caught[0])
+        with pytest.raises(Ending):
+            control.call("state", {})
+
+
+def test_what_is_asked_of_a_service_that_is_closed_is_cancelled() -> None:
+    with Service(one(), no_file, observed=True) as service:
+        control = Control(service)
+    with pytest.raises(CancelledError):
+        control.ask("state", {}).result()
+
+
+def test_who_cancels_waits_no_longer() -> None:
+    with controlled(one()) as control:
+        asked = control.ask("wait", {"position": 5})
+        control.ask("state", {}).result()
+        assert len(control._watched._waiters) == 1
+        asked.cancel()
+        control.ask("state", {}).result()
+        assert control._watched._waiters == []
+
+
+def test_watching_a_cell_that_keeps_pace_changes_nothing() -> None:
+    with controlled(one(), free=False) as control:
+        control.call("type", {"text": "+10"})
+        control.call("wait", {"state": "ready", "position": 10})
+        assert control.call("state", {})["pace"] == 1.0
