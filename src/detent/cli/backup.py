@@ -1,0 +1,225 @@
+"""The verbs `backup` and `restore`: everything that a unit keeps, to a readable file and back."""
+
+import json as json_text
+import sys
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
+
+if TYPE_CHECKING:
+    from detent.hosts.backups import Backup, Explain
+    from detent.hosts.exchange import Blocking
+
+
+class Keeper(Protocol):
+    """A driver of a unit that keeps something."""
+
+    def saved(self) -> dict[str, Any]:
+        """Everything that can be read of what it keeps."""
+
+    def restore(self, saved: Mapping[str, Any], /) -> list[str]:
+        """Write it back; what was written, in sentences."""
+
+
+def backup(
+    model: str,
+    port: str,
+    file: Path,
+    *,
+    json: bool = False,
+    unit: UnitOptions = NO_UNIT_OPTIONS,
+) -> None:
+    """Write everything that a unit keeps to a readable file.
+
+    That is its programs, its parameters, its memory, as far as it tells. Nothing is changed in the unit. The file
+    is TOML; it is written whole or not at all.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, dcb-274, ...
+    port
+        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
+    file
+        The file to write, FILE.toml.
+    json
+        Print what was saved as JSON, too.
+    unit
+        Which unit is meant, and its line.
+    """
+    from detent.cli.unit import progress
+    from detent.cli.unit import unit as connected
+
+    _keeps(model)
+    with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
+        saved = _read(found, model, port)
+    _write(file, saved)
+    if json:
+        print(json_text.dumps({"model": model, "port": port, "file": str(file), "saved": saved.saved}))
+    else:
+        print(f"Wrote {file}: {_contents(saved)}")
+
+
+def restore(
+    model: str,
+    port: str,
+    file: Path,
+    *,
+    yes: bool = False,
+    json: bool = False,
+    unit: UnitOptions = NO_UNIT_OPTIONS,
+) -> None:
+    """Write a backup back to a unit.
+
+    What differs is shown first, and nothing is written before you agree. What the unit holds now is kept in a file,
+    which is named; if it fails half way, it says what is where.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, dcb-274, ...
+    port
+        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
+    file
+        A file that `detent backup` wrote.
+    yes
+        Write without asking.
+    json
+        Print the result as one line of JSON; needs --yes.
+    unit
+        Which unit is meant, and its line.
+    """
+    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.unit import progress
+    from detent.cli.unit import unit as connected
+    from detent.hosts.backups import Backup, BackupError
+    from detent.hosts.errors import DriverError
+
+    _keeps(model)
+    try:
+        wanted = Backup.parse(_text(file))
+        _fits(wanted.model, model)
+        if json and not yes:
+            raise BackupError("with --json nobody is asked: say --yes")
+    except BackupError as error:
+        asked_wrongly(BackupError(f"{file}: {error}"))
+    with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
+        there = _read(found, model, port)
+    differences = wanted.differences(there.saved)
+    if not differences:
+        _tell(json, file, [], ["nothing differs: the unit holds what the file says"], None)
+        return
+    if not json:
+        print("\n".join(differences))
+    if not yes and not sys.stdin.isatty():
+        asked_wrongly("nobody can be asked here, and nothing was written: say --yes to write it")
+    if not yes and input(f"Write {file} to the unit? [y/N] ").strip().lower() not in ("y", "yes"):
+        failed("nothing was written")
+    before = _before(model)
+    _write(before, there)
+    with progress(f"writing to the {model}") as watch, connected(model, port, unit, watch) as found:
+        try:
+            told = cast("Keeper", found).restore(wanted.saved)
+        except DriverError:
+            print(f"detent: what the unit held before is in {before}", file=sys.stderr)
+            raise
+    _tell(json, file, differences, told, before)
+
+
+def _tell(json: bool, file: Path, differences: list[str], told: list[str], before: Path | None) -> None:
+    if json:
+        facts = {"file": str(file), "differences": differences, "told": told, "before": str(before) if before else None}
+        print(json_text.dumps(facts))
+        return
+    print("\n".join(told))
+    if before is not None:
+        print(f"What it held before is in {before}")
+
+
+def _keeps(model: str) -> None:
+    """End the program if a model keeps nothing, or is none."""
+    from detent.cli.target import asked_wrongly
+    from detent.realtime.connect import host
+
+    try:
+        if not hasattr(host(model).shell("Blocking"), "saved"):
+            raise ValueError(f"a {model} keeps nothing that it tells: what it knows is burnt into its EPROM")
+    except ValueError as error:
+        asked_wrongly(error)
+
+
+def _fits(of: str, model: str) -> None:
+    """Raise BackupError if a backup `of` a model is not for `model`. Boards of one firmware take each other's."""
+    from detent.hosts.backups import BackupError
+    from detent.realtime.connect import HOSTS
+
+    if of != model and (HOSTS.get(of) is not HOSTS[model] or HOSTS[model].takes_model):
+        raise BackupError(f"it is the backup of a {of}, and this is a {model}")
+
+
+def _read(unit: "Blocking", model: str, port: str) -> "Backup":
+    from detent.hosts.backups import Backup
+
+    saved = cast("Keeper", unit).saved()
+    when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    return Backup(model, saved, f"What the {model} at {port} held on {when}.")
+
+
+def _write(file: Path, saved: "Backup") -> None:
+    from detent.cli.target import failed
+    from detent.outputs.files import write_whole
+
+    text = saved.text(_explain(saved.model))
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(file, text.encode())
+    except OSError as error:
+        failed(f"{file}: not written: {error.strerror or error}")
+
+
+def _text(file: Path) -> str:
+    from detent.hosts.backups import BackupError
+
+    try:
+        return file.read_text()
+    except OSError as error:
+        raise BackupError(f"cannot read it: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise BackupError("it is no text file") from None
+
+
+def _before(model: str) -> Path:
+    """A new file for what a unit held before a restore."""
+    from detent.realtime.images import default_folder
+
+    when = datetime.now(UTC).strftime("%Y%m%d-%H%M%S-%f")
+    return default_folder() / "before-restore" / f"{model}-{when}.toml"
+
+
+def _explain(model: str) -> "Explain":
+    """What the model's command table says of a line of a program, where it leaves no choice."""
+    from detent.workbench.words import words
+
+    known = words(model)  # the longest first
+
+    def explain(line: str) -> str:
+        rows = next((word.rows for word in known if line.startswith(word.spelling)), ())
+        return rows[0].what if len(rows) == 1 else ""
+
+    return explain
+
+
+def _contents(saved: "Backup") -> str:
+    """What is in a backup, in a few words."""
+    parts = []
+    for key, value in saved.saved.items():
+        if isinstance(value, list):
+            parts.append(f"{key} of {len(value)} lines")
+        elif isinstance(value, dict):
+            parts.append(f"{key} ({len(value)})")
+        else:
+            parts.append(f"{key} {value}")
+    return ", ".join(parts)

@@ -1,0 +1,156 @@
+"""The verb `find`: which controllers are at which ports, found by questions that harm none of them."""
+
+import json as json_text
+import shlex
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from detent.cli import FAILED
+from detent.cli.unit import flag
+
+if TYPE_CHECKING:
+    from detent.hosts.finding import Found, Pass
+    from detent.realtime.addresses import Address
+
+
+def find(
+    *ports: str,
+    model: Sequence[str] = (),
+    baud: Sequence[int] = (),
+    json: bool = False,
+) -> None:
+    """Look for controllers, at the serial ports of this computer or at those named.
+
+    Every protocol and every rate that a controller can be set to is tried, with questions that move, write and reset
+    nothing: SPACE, then F, then the names of a party line. A port where another device listens gets these characters
+    as well: name the ports if that may matter. A controller that runs a program may not answer.
+
+    Ends with 1 if nothing was found.
+
+    Parameters
+    ----------
+    ports
+        Serial devices or links to one, HOST:PORT, rfc2217://HOST:PORT.
+    model
+        Look for this family alone: gs-c200, dcb-274, bs0610, or supersigma, which is looked for on request only. May
+        be given several times.
+    baud
+        Try this rate alone. May be given several times.
+    json
+        Print what was found as one line of JSON.
+    """
+    from detent.cli.target import asked_wrongly, failed
+    from detent.hosts.finding import USUAL
+    from detent.realtime.addresses import Address
+    from detent.realtime.finding import listed, passes_for
+
+    wanted = [(port, "") for port in ports] or [(port.device, port.what) for port in listed()]
+    try:
+        families = _families(model) or USUAL
+        searches = [
+            Search(port, what, Address.parse(port), passes_for(Address.parse(port), families, baud or None))
+            for port, what in wanted
+        ]
+    except ValueError as error:
+        asked_wrongly(error)
+    if not searches:
+        failed("this computer has no serial ports; name one: detent find /dev/ttyUSB0")
+    results = _look(searches)
+    found = [(search, unit) for search, units in results for unit in units]
+    if json:
+        print(json_text.dumps([_facts(search, unit) for search, unit in found]))
+    else:
+        _print(found)
+    if not found:
+        raise SystemExit(FAILED)
+
+
+class Search(NamedTuple):
+    """A port that is looked at: as it was named, what is known of it, and what will be asked."""
+
+    port: str
+    what: str
+    address: "Address"
+    passes: "list[Pass]"
+
+    @property
+    def seconds(self) -> float:
+        """How long it takes where nobody answers."""
+        return sum(one.questions * one.seconds for one in self.passes)
+
+
+def _families(models: Sequence[str]) -> tuple[str, ...]:
+    """The families of some models. Raises ValueError, with the likeliest of the models there are."""
+    from detent.hosts.finding import FORMATS
+    from detent.realtime.connect import HOSTS, host
+
+    return tuple(dict.fromkeys(next(family for family in FORMATS if HOSTS[family] is host(model)) for model in models))
+
+
+def _look(searches: "list[Search]") -> "list[tuple[Search, list[Found]]]":
+    """What is found, port after port. What goes wrong at one is told, and the next is looked at."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from detent.hosts.errors import DriverError
+    from detent.hosts.exchange import Progress as Step
+    from detent.realtime.addresses import PortError
+    from detent.realtime.finding import Talks
+    from detent.realtime.finding import find as look
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    results = []
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("looking", total=sum(search.seconds for search in searches))
+        before = 0.0
+        for search in searches:
+
+            def watch(step: Step, search: Search = search, before: float = before) -> None:
+                bar.update(task, completed=before + step.done / 1e3, description=f"{search.port}: {step.what}")
+
+            try:
+                results.append((search, look(search.address, search.passes, watch)))
+            except PortError as error:
+                print(f"detent: {error}", file=sys.stderr)
+            except (DriverError, Talks) as error:
+                print(f"detent: {search.port}: {error}", file=sys.stderr)
+            before += search.seconds
+    return results
+
+
+def _facts(search: Search, unit: "Found") -> dict[str, object]:
+    return {
+        "port": search.port,
+        "device": search.what,
+        "model": unit.model,
+        "format": None if search.address.formless else str(unit.form),
+        "options": unit.options,
+        "says": unit.says,
+        "terminal": _command(search, unit),
+    }
+
+
+def _command(search: Search, unit: "Found") -> str:
+    """The line to go on with."""
+    from detent.realtime.connect import HOSTS
+
+    words = ["detent", "terminal", unit.model, shlex.quote(search.port)]
+    if not search.address.formless and unit.form.baud != HOSTS[unit.model].form.baud:
+        words.append(flag("baud", unit.form.baud))
+    words += [flag(name, shlex.quote(str(value))) for name, value in unit.options.items()]
+    return " ".join(words)
+
+
+def _print(found: "list[tuple[Search, Found]]") -> None:
+    """A row for each controller, and below it the line to go on with."""
+    for search, unit in found:
+        form = "" if search.address.formless else f", {unit.form}"
+        which = "".join(f", {name} {value}" for name, value in unit.options.items() if name != "checksums")
+        checksum = ", no checksums" if unit.options.get("checksums") is False else ""
+        device = f" ({search.what})" if search.what else ""
+        print(f"{search.port}{device}: {unit.model}{form}{which}{checksum}: {unit.says}")
+        print(f"    {_command(search, unit)}")
+    if not found:
+        print("Nothing was found. Is it switched on, are TXD and RXD crossed, does it run a program?")

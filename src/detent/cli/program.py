@@ -1,0 +1,242 @@
+"""The verbs `upload`, `download` and `compare`: program source, and the program memory of a unit."""
+
+import json as json_text
+from collections.abc import Callable, Sequence
+from difflib import unified_diff
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast
+
+from cyclopts import Parameter
+
+from detent.assembler import Assembly, AssemblyFailed, Language, assemble, disassemble
+from detent.cli import FAILED
+from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
+
+if TYPE_CHECKING:
+    from detent.hosts.exchange import Blocking
+
+
+class Programmed(Protocol):
+    """A driver of a unit with program memory. `read_program` of one whose programs have places takes an address."""
+
+    def write_program(self, lines: Sequence[str], /) -> object:
+        """Store instructions, verified."""
+
+    @property
+    def read_program(self) -> Callable[..., list[str]]:
+        """The instructions that are stored."""
+
+    def save(self) -> object:
+        """Keep the program over a power-off, where storing it does not do that."""
+
+
+def upload(
+    model: str,
+    port: str,
+    file: Path,
+    *,
+    save: Annotated[bool, Parameter(negative=())] = False,
+    json: bool = False,
+    unit: UnitOptions = NO_UNIT_OPTIONS,
+) -> None:
+    """Assemble a program and store it in a unit, verified.
+
+    Labels and comments are fine. Nothing is sent unless all of it can be assembled. The program is not started. A
+    GS-C200 stays in programming mode.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, dcb-274, ...
+    port
+        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
+    file
+        The source, one command a line.
+    save
+        Keep it over a power-off, too: M of a GS-C200, S of a DCB-274 for what stands at 128 to 191.
+    json
+        Print the result as one line of JSON.
+    unit
+        Which unit is meant, and its line.
+    """
+    from detent.cli.unit import progress
+    from detent.cli.unit import unit as connected
+
+    assembly = _assembled(model, file)
+    lines = _lines(assembly)
+    with progress(f"storing in the {model}") as watch, connected(model, port, unit, watch) as found:
+        driver = _programmed(found)
+        driver.write_program(lines)
+        if save:
+            driver.save()
+    facts = {"model": model, "port": port, "file": str(file), "instructions": len(lines), "bytes": assembly.used}
+    if json:
+        print(json_text.dumps({**facts, "saved": save}))
+    else:
+        kept = ", and saved it" if save else ""
+        print(f"Stored {len(lines)} instructions, {assembly.used} bytes, read them back{kept}")
+
+
+def download(
+    model: str,
+    port: str,
+    file: Path | None = None,
+    *,
+    json: bool = False,
+    unit: UnitOptions = NO_UNIT_OPTIONS,
+) -> None:
+    """Read the program of a unit, as source with labels.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, dcb-274, ...
+    port
+        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
+    file
+        A file to write instead of the terminal; it is replaced whole or not at all.
+    json
+        Print source and lines as one line of JSON.
+    unit
+        Which unit is meant, and its line.
+    """
+    from detent.cli.target import failed
+    from detent.cli.unit import progress
+    from detent.cli.unit import unit as connected
+    from detent.outputs.files import write_whole
+
+    language = _language(model)
+    with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
+        lines = _programmed(found).read_program()
+    source = _source(language, lines)
+    if file is not None:
+        try:
+            write_whole(file, source.encode())
+        except OSError as error:
+            failed(f"{file}: not written: {error.strerror or error}")
+    if json:
+        facts = {"model": model, "port": port, "file": str(file) if file else None, "lines": lines, "source": source}
+        print(json_text.dumps(facts))
+    elif file is not None:
+        print(f"Wrote {file}: {source.count(chr(10))} lines")
+    else:
+        print(source, end="")
+
+
+def compare(
+    model: str,
+    port: str,
+    file: Path,
+    *,
+    json: bool = False,
+    unit: UnitOptions = NO_UNIT_OPTIONS,
+) -> None:
+    """Compare the program of a unit with a source file.
+
+    Ends with 1 if they differ. Both are compared as instructions at addresses: labels, comments and spelling do not
+    matter. Where programs have places of their own, as on a DCB-274, those of the file are looked at.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, dcb-274, ...
+    port
+        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
+    file
+        The source.
+    json
+        Print the result as one line of JSON.
+    unit
+        Which unit is meant, and its line.
+    """
+    from detent.cli.unit import progress
+    from detent.cli.unit import unit as connected
+
+    assembly = _assembled(model, file)
+    with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
+        there = _there(_programmed(found), assembly)
+    wanted = [f"{placed.address:4} {placed.text}" for placed in sorted(assembly.placed)]
+    differences = list(unified_diff(there, wanted, "the unit", str(file), lineterm="", n=2))
+    if json:
+        print(json_text.dumps({"model": model, "port": port, "file": str(file), "differences": differences}))
+    elif differences:
+        print("\n".join(differences))
+    else:
+        print(f"The unit holds {file}: {len(wanted)} instructions")
+    if differences:
+        raise SystemExit(FAILED)
+
+
+def _language(model: str) -> Language[Any]:
+    from detent.cli.target import asked_wrongly
+    from detent.controllers.catalogue import CatalogueError, language
+
+    try:
+        return language(model)
+    except CatalogueError as error:
+        asked_wrongly(error)
+
+
+def _assembled(model: str, file: Path) -> Assembly[Any]:
+    """The assembled source; every error of it is reported before the program ends."""
+    from detent.cli.target import asked_wrongly
+
+    language = _language(model)
+    try:
+        source = file.read_text("utf-8-sig")
+    except OSError as error:
+        asked_wrongly(f"{file}: {error.strerror or error}")
+    except UnicodeDecodeError:
+        asked_wrongly(f"{file}: it is no text in UTF-8")
+    try:
+        return assemble(language, source, str(file))
+    except AssemblyFailed as error:
+        asked_wrongly(error)
+
+
+def _programmed(unit: "Blocking") -> Programmed:
+    return cast("Programmed", unit)
+
+
+def _origin(language: Language[Any]) -> Callable[[int], str] | None:
+    """How a language says where the next instruction stands, if its programs have places."""
+    found: Callable[[int], str] | None = getattr(language, "origin", None)
+    return found
+
+
+def _lines(assembly: Assembly[Any]) -> list[str]:
+    """The commands as the driver takes them; where programs have places, with the address of each."""
+    if _origin(assembly.language) is None:
+        return list(assembly.commands)
+    return [f"{placed.address} {placed.text}" for placed in assembly.placed]
+
+
+def _source(language: Language[Any], lines: Sequence[str]) -> str:
+    """Source with labels; the lines as they are if this assembler cannot read them."""
+    try:
+        return disassemble(language, assemble(language, "\n".join(lines)).image)
+    except (AssemblyFailed, ValueError):
+        return "".join(f"{line}\n" for line in lines)
+
+
+def _there(unit: Programmed, assembly: Assembly[Any]) -> list[str]:
+    """What the unit holds in the places of a program, an instruction with its address a line."""
+    language = assembly.language
+    origin = _origin(language)
+    if origin is None:
+        return _addressed(language, unit.read_program())
+    found: list[str] = []
+    end = None
+    for placed in sorted(assembly.placed):
+        if placed.address != end:  # another program begins here
+            found += _addressed(language, [origin(placed.address), *unit.read_program(placed.address)])
+        end = placed.address + len(placed.code)
+    return found
+
+
+def _addressed(language: Language[Any], lines: Sequence[str]) -> list[str]:
+    try:
+        placed = assemble(language, "\n".join(lines)).placed
+    except AssemblyFailed:
+        return list(lines)
+    return [f"{each.address:4} {each.text}" for each in placed]

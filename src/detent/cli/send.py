@@ -1,0 +1,98 @@
+"""The verb `send`: one exchange with a unit, real or emulated, from the command line."""
+
+import json as json_text
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from detent.cli import FAILED
+from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
+
+if TYPE_CHECKING:
+    from detent.hosts.typed import Said
+
+
+def send(
+    model: str,
+    port: str,
+    *lines: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    raw: bool = False,
+    wait: float = 0.5,
+    json: bool = False,
+    unit: UnitOptions = NO_UNIT_OPTIONS,
+) -> None:
+    r"""Send command lines to a unit and print what it answers.
+
+    Each line goes out as its protocol demands: with checksum and CR, character by character, with the name of the
+    axis. A line that begins with a hyphen stands behind `--`: detent send gs-c200 /dev/ttyUSB0 -- -100
+
+    Ends with 1 if a line was refused or not answered.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, dcb-274, ...
+    port
+        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
+    lines
+        Command lines as the manual writes them.
+    raw
+        The lines are bytes, with escapes like \r and \x1b, and go out as they are.
+    wait
+        With --raw: seconds in which answers are collected.
+    json
+        Print one line of JSON.
+    unit
+        Which unit is meant, and its line.
+    """
+    from detent.cli.target import asked_wrongly
+    from detent.cli.unit import unit as connected
+    from detent.hosts.typed import raw as exchange
+    from detent.hosts.typed import say
+
+    try:
+        if not lines:
+            raise ValueError("say what to send: detent send MODEL PORT LINE...")
+        data = [unescaped(line) for line in lines] if raw else []
+    except ValueError as error:
+        asked_wrongly(error)
+    refused, told = False, []
+    with connected(model, port, unit) as found:
+        if raw:
+            for sent in data:
+                came = found.perform(exchange(sent, wait))
+                told.append({"sent": escaped(sent), "received": escaped(came)})
+                if not json:
+                    print(f"> {escaped(sent)}\n< {escaped(came)}", flush=True)
+        else:
+            for line in lines:
+                said = found.perform(say(found.driver, line))
+                refused |= said.refused
+                told.append({"sent": line, **said._asdict()})
+                if not json:
+                    print(f"> {line}\n{shown(said)}", flush=True)
+    if json:
+        print(json_text.dumps({"model": model, "port": port, "exchanges": told}))
+    if refused:
+        raise SystemExit(FAILED)
+
+
+def shown(said: "Said") -> str:
+    """What was said, a line each behind ``<``, and what it means."""
+    lines = [f"< {answer}" for answer in said.answers] or ["<"]
+    if said.meaning:
+        lines[-1] += f"  ({said.meaning})"
+    return "\n".join(lines)
+
+
+def unescaped(text: str) -> bytes:
+    r"""The bytes of a text with escapes: ``F\x16\r``. Raises ValueError."""
+    try:
+        return text.encode("latin-1").decode("unicode_escape").encode("latin-1")
+    except (UnicodeError, ValueError):
+        raise ValueError(f"{text!r}: bytes are written as characters and escapes like \\r, \\n and \\x1b") from None
+
+
+def escaped(data: bytes) -> str:
+    """Bytes as people read them."""
+    return data.decode("latin-1").encode("unicode_escape").decode("ascii")

@@ -1,0 +1,134 @@
+"""The unit that a host-side verb talks to: its options on the command line, its connection, how far it is."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from detent.hosts import exchange
+    from detent.hosts.exchange import Blocking, Watch
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class UnitOptions:
+    """Which unit is meant, and its line. Everything has the default of the model.
+
+    Parameters
+    ----------
+    address
+        GS-C200: 1 to 7 on a multipoint line.
+    no_checksum
+        GS-C200: CHS is strapped low.
+    revision
+        GS-C200: firmware revision; up to 2.1 checksums are another.
+    name
+        DCB-274: name of the axis on a party line, or as --mode says.
+    mode
+        DCB-274: single, party, daisy or sin10.
+    first
+        DCB-274: name of the first axis of a daisy chain.
+    motor
+        BS0610, BS0710: X or Y.
+    drive
+        SUPERSIGMA: number of the drive, 0 to 255.
+    baud
+        Rate of the line.
+    data_bits
+        Data bits of a character.
+    parity
+        none, odd or even.
+    stop_bits
+        Stop bits of a character.
+    patience
+        Seconds that the unit may take before it answers.
+    """
+
+    address: int | None = None
+    no_checksum: Annotated[bool, Parameter(negative=())] = False
+    revision: str | None = None
+    name: str | None = None
+    mode: str | None = None
+    first: str | None = None
+    motor: str | None = None
+    drive: int | None = None
+    baud: int | None = None
+    data_bits: int | None = None
+    parity: str | None = None
+    stop_bits: int | None = None
+    patience: float | None = None
+
+    def given(self, model: str) -> dict[str, Any]:
+        """What `detent.connect` is told for `model`. Raises ValueError for an option that is not for it."""
+        from detent.realtime.connect import host
+        from detent.uart import Format
+
+        found = host(model)
+        chosen = {field.name: value for field in fields(self) if (value := getattr(self, field.name)) is not None}
+        if chosen.pop("no_checksum"):
+            chosen["checksums"] = False
+        for option in chosen:
+            if option not in found.options and option not in Format._fields:
+                flags = ", ".join(flag(one) for one in found.options)
+                raise ValueError(f"{flag(option)} is not for a {model}; it takes {flags}")
+        if "name" in chosen and "mode" not in chosen:
+            chosen["mode"] = "party"  # in single mode an axis needs no name
+        return chosen
+
+
+NO_UNIT_OPTIONS = UnitOptions()
+
+
+def flag(option: str, value: object = None) -> str:
+    """An option of a driver as it is written on the command line, with its value if one is given."""
+    if option == "checksums":
+        return "--no-checksum"
+    written = f"--{option.replace('_', '-')}"
+    return written if value is None else f"{written} {value}"
+
+
+@contextmanager
+def unit(model: str, port: str, options: UnitOptions, watch: "Watch | None" = None) -> "Iterator[Blocking]":
+    """The driver of the unit. What goes wrong ends the program: 2 for what was asked wrongly, 1 for what failed."""
+    from detent.cli.target import asked_wrongly, failed
+    from detent.hosts.errors import DriverError
+    from detent.realtime.addresses import PortError
+    from detent.realtime.connect import connect
+
+    try:
+        connected: Blocking = connect(model, port, watch=watch, **options.given(model))
+    except PortError as error:
+        failed(error)
+    except ValueError as error:
+        asked_wrongly(error)
+    with connected:
+        try:
+            yield connected
+        except DriverError as error:
+            failed(error)
+        except ValueError as error:
+            asked_wrongly(error)
+
+
+@contextmanager
+def progress(what: str) -> "Iterator[Watch]":
+    """Shows how far a long operation is, with the time it will still take; on a terminal only, and gone afterwards."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=None)
+        totals = [0]
+
+        def watch(step: "exchange.Progress") -> None:
+            if step.total != totals[0]:  # another part of the operation
+                bar.reset(task, total=step.total)
+                totals[0] = step.total
+            bar.update(task, completed=step.done, description=f"{what}: {step.what}" if step.what else what)
+
+        yield watch

@@ -1,0 +1,185 @@
+"""The verb `workbench`: a cell in a browser, in real time, until Ctrl-C."""
+
+import asyncio
+import json as json_text
+import math
+import sys
+import webbrowser
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from detent.workbench.client import Bench
+
+FIRST = Path("drilling", "bar-after-bar.toml")
+
+
+def workbench(
+    target: Annotated[str | None, Parameter(show_default=False)] = None,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    token: str | None = None,
+    open_: Annotated[bool, Parameter(name="--open")] = False,
+    folder: Path | None = None,
+    pty: Annotated[list[Path] | None, Parameter(consume_multiple=(0, 1), negative=())] = None,
+    tcp: str | None = None,
+    rfc2217: str | None = None,
+    serial: Path | None = None,
+    pace: float = 1.0,
+    hold: bool = False,
+    line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
+    strap: Annotated[Sequence[str], Parameter(negative=())] = (),
+    set_: Annotated[Sequence[str], Parameter(name="--set", negative=())] = (),
+    state: Path | None = None,
+    json: bool = False,
+) -> None:
+    """Show a controller or a cell in a browser, running in real time.
+
+    Without a target it is the drilling cell of the GS-C200 datasheet. The address to open is printed; Ctrl-C ends it.
+
+    Parameters
+    ----------
+    target
+        A model by name, or a cell file (CELL.toml).
+    host
+        Listen on this address. Any but loopback needs --token.
+    port
+        Listen on this port; 0: any free one.
+    token
+        Let in only who knows this word of at least 8 characters; the address that is printed has it.
+    open_
+        Open the address in the browser of this machine.
+    folder
+        The only folder whose files can be opened and saved: that of the cell file, or the current one.
+    pty
+        Open a pseudo-terminal; with a value, make this symbolic link to it (of several lines: LINK-LINE).
+    tcp
+        Listen on HOST:PORT for one host program at a time. Port 0: any free port; several lines count up from PORT.
+    rfc2217
+        The same as a serial port over TCP: a client sets baud rate and format, and hears garbage if they do not fit.
+    serial
+        Be the controller at this serial device. The line timing is then left to the wire.
+    pace
+        Run so many times as fast as real time.
+    hold
+        Let the cell stand at first.
+    line_timing
+        Let characters take their time on the serial line.
+    strap
+        PIN=LEVEL (low, high, open), or UNIT.PIN=LEVEL for a cell.
+    set_
+        OPTION=VALUE, or UNIT.OPTION=VALUE for a cell.
+    state
+        Keep EEPROM images and drafts in this folder instead of $XDG_STATE_HOME/detent or ~/.local/state/detent.
+    json
+        Print one line of JSON once everything is ready, and nothing else.
+    """
+    from detent.cell.description import Problem
+    from detent.cli.demo import examples
+    from detent.cli.serve import asked_endpoints
+    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.target import target as find
+    from detent.realtime.images import ImagesUnusable, cell_name, default_folder
+
+    links = list(pty) if pty is not None else None
+    if target is None and links:  # `workbench --pty gs-c200`: what follows --pty was meant to be shown
+        target, links = str(links[0]), []
+    own = Path(target).parent if target is not None and _is_file(target) else Path()
+    shown = target if target is not None else str(examples() / FIRST)
+    kept = state if state is not None else default_folder()
+    try:
+        if find_spec("nicegui") is None:
+            raise Problem("", "", "the workbench needs NiceGUI: pip install 'detent[workbench]'")
+        if not (math.isfinite(pace) and pace > 0):
+            raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
+        endpoints = asked_endpoints(links, tcp, rfc2217, serial)
+        find(shown, straps=strap, options=set_)  # at once, not when everything is loaded
+    except Problem as error:
+        asked_wrongly(error)
+    from detent.workbench.client import Bench, BenchError
+    from detent.workbench.drafts import Drafts
+    from detent.workbench.folder import Folder, OutsideFolder
+    from detent.workbench.guard import check_place
+    from detent.workbench.listening import Place, listen
+
+    try:
+        check_place(host, token)
+        chosen = Folder(folder if folder is not None else own)
+        listening = listen(Place(host, port, token))
+    except (OutsideFolder, ValueError) as error:
+        asked_wrongly(error)
+    except OSError as error:
+        asked_wrongly(Problem("", "--host and --port", f"cannot listen on {host}:{port}: {error.strerror or error}"))
+    url = listening.url(token)
+
+    async def show() -> None:
+        opening = asyncio.create_task(
+            Bench.open(
+                shown, straps=strap, options=set_, wanted=endpoints, pace=pace, line_timing=line_timing,
+                state_dir=kept, held=hold,
+            )
+        )  # fmt: skip
+        server = await asyncio.to_thread(import_module, "detent.workbench.server")  # seconds, while the cell starts
+        bench = await opening
+        try:
+            drafts = Drafts(kept, cell_name(shown, is_file=_is_file(shown)))
+            site = server.application(bench, chosen, drafts, Place(host, listening.port, token))
+
+            def ready() -> None:
+                if json:
+                    print(json_text.dumps(_facts(bench, url)), flush=True)
+                else:
+                    _print_ready(bench, url, chosen.root, kept)
+                if open_:
+                    webbrowser.open(url)
+
+            await server.serve(site, listening, ready)
+        finally:
+            await bench.close()
+
+    try:
+        asyncio.run(show())
+    except (Problem, ImagesUnusable) as error:
+        asked_wrongly(error)
+    except (BenchError, OSError) as error:
+        failed(error)
+    finally:
+        listening.socket.close()
+
+
+def _is_file(target: str) -> bool:
+    """Whether a target is a cell file, as `cli.target` tells it from a model."""
+    return target.endswith(".toml") or "/" in target
+
+
+def _facts(bench: "Bench", url: str) -> dict[str, object]:
+    """What `--json` tells."""
+    endpoints = [
+        {"unit": line.units[0] if len(line.units) == 1 else line.name, "kind": one.kind, "address": one.address}
+        for line in bench.picture.lines.values()
+        for one in line.endpoints
+    ]
+    return {"url": url, "endpoints": endpoints}
+
+
+def _print_ready(bench: "Bench", url: str, folder: Path, kept: Path) -> None:
+    """Say what to open, and what hosts connect to."""
+    picture = bench.picture
+    for report in picture.reports:
+        print(f"detent: {report}", file=sys.stderr)
+    print(f"{picture.title or picture.target}: {', '.join(picture.units)}")
+    print(f"Open in a browser:  {url}")
+    ends = [(line, one) for line in picture.lines.values() for one in line.endpoints]
+    if ends:
+        print("Hosts connect to:")
+    width = max((len(line.name) for line, _ in ends), default=0)
+    for line, one in ends:
+        print(f"  {line.name:{width}}  {one.address}  # {one.kind}, {line.format}")
+    print(f"Files are opened and saved in {folder}; EEPROM images and drafts are kept in {kept}")
+    print("Ctrl-C ends it.", flush=True)

@@ -1,0 +1,127 @@
+import json
+from typing import Any
+
+import pytest
+from tests.realtime.served import address, served
+
+from detent.cli import main
+from detent.cli.send import escaped, unescaped
+
+
+def told(capsys: pytest.CaptureFixture[str], *words: str, status: int = 0) -> tuple[str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main(["send", *words])
+    out, err = capsys.readouterr()
+    assert ended.value.code == status, err
+    return out, err
+
+
+def test_lines_go_out_framed_and_answers_are_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("gs-c200s") as service:
+        out, _ = told(capsys, "gs-c200s", address(service), "F", "V1", "V2")
+    assert out.splitlines() == [
+        "> F",
+        "< R  (ready)",
+        "> V1",
+        "< V+0  (position 0)",
+        "> V2",
+        "< V70  (UI1=1, UI2=1, UI3=1, UO1=0, UO2=0, UO3=0)",
+    ]
+
+
+def test_a_line_with_a_hyphen_stands_behind_two(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("gs-c200s") as service:
+        out, _ = told(capsys, "gs-c200s", address(service), "--", "-100")
+        assert out == "> -100\n< Y  (done, stored or begun)\n"
+
+
+def test_a_refused_line_ends_it_with_1_and_the_datasheets_words(capsys: pytest.CaptureFixture[str]) -> None:
+    # "E2: command argument out of limit or not requested"
+    with served("gs-c200") as service:
+        out, _ = told(capsys, "gs-c200", address(service), "A9", "F", status=1)
+    assert out == "> A9\n< E2  (command argument out of limit or not requested)\n> F\n< R  (ready)\n"
+
+
+def test_a_program_is_listed_to_its_end(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("gs-c200s") as service:
+        out, _ = told(capsys, "gs-c200s", address(service), "Po", "A1", "+50", "Px", "Q")
+    assert out.endswith("> Q\n< A1\n< +50\n< END\n")
+
+
+def test_json_has_what_was_said(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("gs-c200") as service:
+        out, _ = told(capsys, "gs-c200", address(service), "F", "--json")
+    found: dict[str, Any] = json.loads(out)
+    assert found["exchanges"] == [{"sent": "F", "answers": ["R"], "meaning": "ready", "refused": False}]
+
+
+def test_bytes_go_out_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("gs-c200") as service:
+        out, _ = told(capsys, "gs-c200", address(service), "--raw", r"F\x56\r", "--wait", "0.2")
+    assert out == "> FV\\r\n< RR\\r\n"
+    assert unescaped(r"\x1b\n\\x") == b"\x1b\n\\x"
+    assert escaped(b"\x1b\n\\x\xff") == r"\x1b\n\\x\xff"
+    out, err = told(capsys, "gs-c200", "/dev/no-such-device", "--raw", "\\x1", status=2)
+    assert "escapes like" in err
+
+
+def test_every_model_is_spoken_to_in_its_own_way(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("dcb-274") as service:
+        out, _ = told(
+            capsys, "dcb-274", address(service), "--patience", "1", "+100", "W 0", "Z", "Q 0", "foo", status=1
+        )
+    shown = out.splitlines()
+    assert shown[:6] == ["> +100", "<  (done)", "> W 0", "<  (done)", "> Z", "<       100"]
+    assert "< 0 + 1001" in shown
+    assert shown[-1].startswith("< #  (refuses 'foo'")
+    with served("dcb-274", straps={"PARTY": "high"}) as service:
+        out, _ = told(capsys, "dcb-274", address(service), "--patience", "1", "--name", "A", "X")
+    assert out == "> X\n<   26\n"  # "the model, in party line" (page 52)
+    with served("bs0610") as service:
+        out, _ = told(capsys, "bs0610", address(service), "--patience", "10", "X100GI", "--", "-1?", "500")
+    assert out.splitlines() == ["> X100GI", "< *  (done)", "> -1?", "< X,-1,100", "< *", "> 500", "< *  (done)"]
+    with served("supersigma") as service:
+        out, _ = told(capsys, "supersigma", address(service), "--patience", "10", "status", "move +100")
+    assert out == "> status\n< 0 steps  (at rest)\n> move +100\n<  (sent; status tells what comes of it)\n"
+
+
+def test_single_characters_of_the_dcb_274_are_typed_as_words(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("dcb-274") as service:
+        out, _ = told(capsys, "dcb-274", address(service), "--patience", "1", "M 1000", "@", "ESC", "^C", "^N B", "X")
+    assert "> ESC\n<  (everything stopped at once)\n" in out
+    assert "> @\n<  (slowing down)\n" in out
+    assert "n=B" in out.splitlines()[-1]
+
+
+def test_a_module_with_checksums_tells_who_sends_none(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("gs-c200") as service:
+        out, _ = told(capsys, "gs-c200", address(service), "F", "--no-checksum", status=1)
+    assert "it answers with a checksum, so it wants one" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "remedy"),
+    [
+        (("gs-c20", "PORT", "F"), 2, "did you mean gs-c200?"),
+        (("gs-c200", "PORT"), 2, "say what to send: detent send MODEL PORT LINE"),
+        (("gs-c200", "PORT", "F", "--name", "A"), 2, "--name is not for a gs-c200; it takes --address, --no-checksum"),
+        (("gs-c200", "PORT", "F", "--address", "9"), 2, "an address is 1 to 7"),
+        (("gs-c200", "/dev/no-such-device", "F"), 1, "there is no such device; detent find"),
+        (("gs-c200", "rfc2217://PORT", "F"), 2, "no HOST:PORT"),
+        (("gs-c200", "PORT", "\u00e9"), 2, "is no command line"),
+        (("supersigma", "PORT", "jump"), 2, "type move STEPS"),
+        (("bs0610", "PORT", " "), 2, "is no command line"),
+        (("dcb-274", "PORT", "X"), 1, "does not answer SPACE"),
+        (("dcb-274", "PORT", "+1234567890123456"), 2, "a line has 15"),
+        (("gs-c200", "PORT", "F", "--address", "2", "--patience", "0.05"), 1, "at address 2: does not"),
+    ],
+)
+def test_what_is_wrong_is_one_line_with_a_remedy(
+    capsys: pytest.CaptureFixture[str], words: tuple[str, ...], status: int, remedy: str
+) -> None:
+    with served("gs-c200", straps={"SEL0": "low"}) as service:
+        given = [address(service) if word == "PORT" else word for word in words]
+        out, err = told(capsys, *given, status=status)
+    assert out == ""
+    assert remedy in err
+    assert err.count("\n") == 1

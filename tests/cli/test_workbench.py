@@ -1,0 +1,67 @@
+"""The verb `workbench`: how it is asked wrongly, and what it prints when it is ready."""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from detent.cli import main
+
+pytest.importorskip("nicegui", reason="nicegui is not installed")
+
+COMMAND = [sys.executable, "-c", "from detent.cli import main; main()", "workbench"]
+
+
+def wrong(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one line on stderr of a command that is asked wrongly."""
+    with pytest.raises(SystemExit) as ended:
+        main(["workbench", *map(str, arguments)])
+    out, err = capsys.readouterr()
+    assert ended.value.code == 2, err
+    assert out == ""
+    assert err.count("\n") == 1
+    return err
+
+
+def test_an_address_that_others_can_reach_needs_a_token(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "--token" in wrong(capsys, "--host", "0.0.0.0")
+    assert "too short" in wrong(capsys, "--host", "0.0.0.0", "--token", "short")
+
+
+def test_a_folder_that_is_none_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert "no folder" in wrong(capsys, "--folder", tmp_path / "nothing")
+
+
+def test_a_port_that_is_taken_is_told_with_the_remedy(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        told = wrong(capsys, "--port", taken.getsockname()[1])
+    assert "--port" in told
+
+
+def test_a_pace_that_is_none_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "--pace" in wrong(capsys, "--pace", "0")
+
+
+def test_a_model_that_there_is_not_is_told_with_the_likeliest(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert "did you mean gs-c200" in wrong(capsys, "gs-c20", "--state", tmp_path)
+    assert "cannot read" in wrong(capsys, tmp_path / "nothing.toml", "--state", tmp_path)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_it_says_what_to_open_and_a_signal_ends_it_cleanly(tmp_path: Path, number: int) -> None:
+    command = [*COMMAND, "gs-c200", "--state", str(tmp_path), "--folder", str(tmp_path), "--json"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    facts = json.loads(line)
+    assert facts["url"].startswith("http://127.0.0.1:")
+    assert [(end["unit"], end["kind"]) for end in facts["endpoints"]] == [("gs-c200", "pty")]
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (0, "", "")
