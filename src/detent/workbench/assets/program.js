@@ -1,0 +1,430 @@
+/* The Program page: the text of a unit's program, its memory, and the debugger. What it knows of the language, and
+   every check, comes from the server (detent/workbench/editing.py). */
+
+import { makeEditor } from "./program_editor.js";
+
+const CHECK_AFTER = 180,
+  KEEP_AFTER = 400; // ms behind the last change
+
+class Program {
+  constructor(root) {
+    this.root = root;
+    this.facts = null;
+    this.file = "";
+    this.saved = ""; // the text as it is in the file, or in the cell's own source
+    this.checked = null;
+    this.different = []; // lines that memory has otherwise
+    this.ends = [];
+    this.seen = ""; // of what the running line was shown for
+    const find = (selector) => root.querySelector(selector);
+    this.at = {
+      file: find(".program-file"),
+      errors: find(".program-errors"),
+      used: find(".program-used"),
+      meter: find(".program-meter"),
+      loaded: find(".program-loaded"),
+      line: find(".program-line"),
+      why: find(".program-why"),
+      dialog: find("dialog"),
+    };
+    for (const tab of root.querySelectorAll("[data-unit]"))
+      tab.addEventListener("click", () => this.show(tab.dataset.unit));
+    for (const key of root.querySelectorAll("[data-key]"))
+      key.addEventListener("click", () => this.deeds[key.dataset.key]());
+    find("[value=cancel]").addEventListener("click", () => this.at.dialog.close());
+  }
+
+  async open() {
+    this.editor = await makeEditor(this.root.querySelector(".program-editor"), {
+      changed: (typed) => this.changed(typed),
+      breakpoints: (lines) => this.setBreakpoints(lines),
+      moved: () => {},
+      keys: {
+        "Mod-s": () => this.deeds.save(),
+        "Mod-Enter": () => (this.facts.language ? this.deeds.run() : this.deeds.send()),
+        F8: () => this.deeds.go(),
+        F9: () => this.deeds.break(),
+        F10: () => this.deeds.step(),
+        "Shift-F10": () => this.deeds.back(),
+        F4: () => this.deeds.cursor(),
+      },
+    });
+    const units = [...this.root.querySelectorAll("[data-unit]")].map((tab) => tab.dataset.unit);
+    const last = detent.remembered("program.unit");
+    this.ends.push(detent.frame(() => this.look()));
+    if (units.length) await this.show(units.includes(last) ? last : units[0]);
+  }
+
+  close() {
+    this.flush();
+    for (const end of this.ends) if (typeof end === "function") end();
+    this.closed = true;
+    if (this.editor) this.editor.close();
+  }
+
+  /* -- the unit and its text -------------------------------------------------------------------------------- */
+
+  async show(unit) {
+    this.flush();
+    const facts = await this.ask("program_about", unit);
+    if (!facts || this.closed) return;
+    facts.draft = facts.language ? unit : `script.${facts.line}`; // a script is that of the Terminal page
+    const draft = await this.ask("draft", facts.draft);
+    if (this.closed) return;
+    this.facts = facts;
+    detent.remember("program.unit", unit);
+    for (const tab of this.root.querySelectorAll("[data-unit]"))
+      tab.setAttribute("aria-selected", tab.dataset.unit === unit);
+    for (const watch of this.root.querySelectorAll("[data-watch]")) watch.hidden = watch.dataset.watch !== unit;
+    for (const box of this.root.querySelectorAll("[data-for]"))
+      box.hidden = (box.dataset.for === "language") !== facts.language;
+    this.root.classList.toggle("no-language", !facts.language);
+    this.root.querySelector("[data-key=keep]").hidden = this.root.querySelector("[data-key=compare-kept]").hidden =
+      !facts.nonvolatile;
+    this.at.why.textContent = `A ${facts.model} holds no programs. Write lines to send to it instead: “@ 500 ms” is a pause, “@ answer” waits for an answer.`;
+    this.file = draft ? draft.file : "";
+    this.saved = this.file ? null : facts.source; // of a file that has not been read it is not known
+    this.checked = null;
+    this.different = [];
+    this.ahead = false;
+    this.editor.speak(facts);
+    this.editor.set(draft ? draft.text : facts.source);
+    this.editor.breakAt([]);
+    this.say("");
+    this.name();
+    await this.check();
+  }
+
+  changed(typed) {
+    if (!this.facts) return;
+    this.different = [];
+    clearTimeout(this.checkSoon);
+    this.checkSoon = setTimeout(() => this.check(), CHECK_AFTER);
+    if (!typed) return;
+    clearTimeout(this.keepSoon);
+    this.keepSoon = setTimeout(() => this.flush(), KEEP_AFTER);
+    this.unkept = this.facts.draft;
+    this.root.dataset.draft = "changed";
+    this.name();
+  }
+
+  /* Keep the draft now. */
+  flush() {
+    clearTimeout(this.keepSoon);
+    if (!this.unkept) return;
+    const draft = this.unkept;
+    this.unkept = null;
+    detent.call("keep_draft", draft, this.editor.text, this.file).then(
+      () => {
+        if (!this.unkept) this.root.dataset.draft = "kept";
+      },
+      (error) => detent.toast(`The draft is not kept: ${error.message}`, "error"),
+    );
+  }
+
+  name() {
+    const dirty = this.saved === null || this.editor.text !== this.saved;
+    this.at.file.textContent =
+      (this.file || (this.facts.source ? "of the cell" : "no file")) + (dirty ? " \u2022" : "");
+    this.at.file.title = dirty ? "changed, kept as a draft" : "";
+  }
+
+  async check() {
+    const { unit, language } = this.facts;
+    if (!language) {
+      this.at.errors.replaceChildren();
+      return;
+    }
+    const text = this.editor.text,
+      found = await this.ask("program_check", unit, text);
+    if (!found || this.closed || this.facts.unit !== unit || this.editor.text !== text) return;
+    const first = this.checked === null || (found.loaded && !this.checked.loaded);
+    this.checked = found;
+    this.memory = detent.get(`u.${unit}.memory`);
+    this.lines = new Map(found.places.map(([line, address]) => [address, line]));
+    this.addresses = new Map(found.places.map(([line, address]) => [line, address]));
+    this.editor.check(found);
+    this.at.errors.replaceChildren(
+      ...found.errors.map(([line, column, , message]) => {
+        const button = document.createElement("button"),
+          item = document.createElement("li"),
+          where = document.createElement("b");
+        button.type = "button";
+        where.textContent = `${line}:${column}`;
+        button.append(where, ` ${message}`);
+        button.addEventListener("click", () => this.editor.goTo(line, column));
+        item.append(button);
+        return item;
+      }),
+    );
+    const part = found.used / found.capacity;
+    this.at.used.textContent = `${found.used} of ${found.capacity} bytes`;
+    this.at.meter.style.setProperty("--part", Math.min(part, 1));
+    this.at.meter.setAttribute("aria-valuenow", found.used);
+    this.at.meter.setAttribute("aria-valuemax", found.capacity);
+    this.at.meter.classList.toggle("full", part > 1);
+    this.at.loaded.textContent = found.errors.length
+      ? `${found.errors.length} error${found.errors.length > 1 ? "s" : ""}`
+      : found.loaded
+        ? "as in program memory"
+        : "not in program memory";
+    this.at.loaded.classList.toggle("good", found.loaded);
+    this.root.dataset.checked = found.errors.length ? "errors" : found.loaded ? "loaded" : "sound";
+    if (first && found.loaded) {
+      if (this.ahead) this.setBreakpoints(this.editor.breakLines);
+      else this.takeBreakpoints();
+    }
+    this.seen = "";
+    this.look();
+  }
+
+  /* -- the debugger --------------------------------------------------------------------------------------------- */
+
+  /* Show what the cell does, at each push. */
+  look() {
+    if (!this.facts || this.closed) return;
+    const key = `u.${this.facts.unit}`,
+      get = (name) => detent.get(`${key}.${name}`);
+    this.registers();
+    this.script();
+    const held = detent.get("held"),
+      address = get("address"),
+      memory = get("memory"),
+      breaks = JSON.stringify(get("breaks") || []);
+    const go = this.root.querySelector("[data-key=go] span"),
+      word = held ? "Go" : "Pause";
+    if (go.textContent !== word) go.textContent = word;
+    if (this.checked && memory !== this.memory) {
+      this.memory = memory;
+      this.check();
+    }
+    const seen = `${held} ${address} ${this.checked && this.checked.loaded} ${this.different}`;
+    if (seen !== this.seen && this.facts.language) {
+      this.seen = seen;
+      const line =
+        this.checked && this.checked.loaded && address !== null && address !== undefined
+          ? (this.lines.get(address) ?? null)
+          : null;
+      this.editor.spot(line, held, this.different);
+      if (line !== null && held) this.editor.reveal(line);
+      this.at.line.textContent =
+        address === null || address === undefined ? "no program runs" : `${address}  ${get("running")}`;
+      this.root.dataset.line = line === null ? "" : line;
+    }
+    if (this.checked && this.checked.loaded && !this.ahead && breaks !== this.breaks) this.takeBreakpoints();
+  }
+
+  /* How far a script is. */
+  script() {
+    if (this.facts.language) return;
+    const how = detent.get(`script.${this.facts.line}`) || { running: false, line: 0, told: "" },
+      text = JSON.stringify(how);
+    if (text === this.how) return;
+    this.how = text;
+    this.root.querySelector("[data-key=stop]").disabled = !how.running;
+    this.editor.spot(how.running ? how.line : null, false, []);
+    this.say(
+      how.running ? `line ${how.line}` : how.told === "done" ? "Sent. The answers are on the Terminal page." : how.told,
+      how.told && how.told !== "done" ? "warn" : "",
+    );
+  }
+
+  registers() {
+    const list = this.root.querySelector(`[data-registers="${CSS.escape(this.facts.unit)}"]`);
+    const values = Object.entries(detent.get(`u.${this.facts.unit}.reg`) || {}),
+      text = JSON.stringify(values);
+    if (!list || list.dataset.text === text) return;
+    list.dataset.text = text;
+    list.replaceChildren(
+      ...values.flatMap(([name, value]) =>
+        ["dt", "dd"].map((tag, i) => {
+          const cell = document.createElement(tag);
+          cell.textContent = [name, value][i];
+          return cell;
+        }),
+      ),
+    );
+  }
+
+  /* Show the breakpoints that the cell has. */
+  takeBreakpoints() {
+    const addresses = detent.get(`u.${this.facts.unit}.breaks`) || [];
+    this.breaks = JSON.stringify(addresses);
+    this.ahead = false;
+    this.editor.breakAt(
+      addresses
+        .map((address) => this.lines.get(address))
+        .filter(Boolean)
+        .sort((a, b) => a - b),
+    );
+  }
+
+  /* Somebody has set or removed a breakpoint: those on no instruction go to the next one. */
+  setBreakpoints(lines) {
+    if (!this.checked || !this.facts.language) {
+      this.editor.breakAt([]);
+      return;
+    }
+    const places = [...this.addresses.keys()].sort((a, b) => a - b);
+    const moved = [...new Set(lines.map((line) => places.find((place) => place >= line)).filter(Boolean))].sort(
+      (a, b) => a - b,
+    );
+    this.editor.breakAt(moved);
+    this.ahead = !this.checked.loaded; // set in a text that is not loaded yet
+    if (this.ahead) this.say("Breakpoints are in force once this text is loaded.");
+    else
+      this.ask(
+        "program_breaks",
+        this.facts.unit,
+        moved.map((line) => this.addresses.get(line)),
+      );
+  }
+
+  /* -- what the keys do ------------------------------------------------------------------------------------------- */
+
+  get deeds() {
+    const { facts, editor } = this,
+      unit = facts && facts.unit;
+    const load = async (start) => {
+      const lines = editor.breakLines,
+        told = await this.ask("program_load", unit, editor.text, start);
+      if (told === undefined) return;
+      this.say(told, "good");
+      await this.check();
+      if (this.checked && this.checked.loaded) this.setBreakpoints(lines);
+    };
+    const compare = async (kept) => {
+      const found = await this.ask("program_compare", unit, editor.text, kept);
+      if (!found) return;
+      this.different = found.lines;
+      this.say(found.words, found.same ? "good" : "warn");
+      this.look();
+      if (found.lines.length) editor.reveal(found.lines[0]);
+    };
+    return {
+      run: () => load(true),
+      load: () => load(false),
+      keep: async () => this.say((await this.ask("program_save", unit)) ?? "", "good"),
+      compare: () => compare(false),
+      "compare-kept": () => compare(true),
+      fetch: async () => {
+        const text = await this.ask("program_fetch", unit, false);
+        if (text !== undefined) this.replace(text, this.file);
+      },
+      revert: async () => {
+        this.unkept = null;
+        if ((await this.ask("forget_draft", facts.draft)) === undefined) return;
+        this.file = "";
+        this.saved = facts.source;
+        editor.set(facts.source);
+        this.name();
+        this.say("The draft is gone.");
+      },
+      open: () =>
+        this.chooseFile("Open", "Open", async (name) => {
+          const text = await this.ask("read_file", name);
+          if (text === undefined) return false;
+          this.file = name;
+          this.saved = text;
+          this.replace(text, name);
+          return true;
+        }),
+      save: () =>
+        this.chooseFile("Save in the chosen folder", "Save", async (name) => {
+          const text = editor.text,
+            where = await this.ask("write_file", name, text);
+          if (where === undefined) return false;
+          this.file = name;
+          this.saved = text;
+          this.unkept = facts.draft;
+          this.flush();
+          this.name();
+          detent.toast(`Saved: ${where}`);
+          return true;
+        }),
+      go: () => this.ask(detent.get("held") ? "go" : "hold"),
+      step: () => this.ask("step_instruction", unit),
+      back: () => this.ask("step_back", unit),
+      cursor: () => {
+        const place =
+          this.checked && [...this.addresses.keys()].sort((a, b) => a - b).find((line) => line >= editor.line);
+        if (!place) detent.toast("There is no instruction at the cursor or behind it.", "error");
+        else if (!this.checked.loaded) detent.toast("Load the program first.", "error");
+        else this.ask("program_run_to", unit, this.addresses.get(place));
+      },
+      break: () => editor.toggleBreakpoint(),
+      errors: () => this.ask("break_on_errors", !detent.get("breakerrors")),
+      send: () => this.ask("run_script", facts.line, unit, editor.text),
+      "send-line": () => this.ask("run_script", facts.line, unit, editor.text.split("\n")[editor.line - 1]),
+      stop: () => this.ask("stop_script", facts.line),
+    };
+  }
+
+  /* Another text in place of this one; it is kept as a draft. */
+  replace(text, file) {
+    this.file = file;
+    this.editor.set(text);
+    this.unkept = this.facts.draft;
+    this.flush();
+    this.name();
+  }
+
+  async chooseFile(title, word, deed) {
+    const names = await this.ask("files", []);
+    if (!names) return;
+    const { dialog } = this.at,
+      form = dialog.firstElementChild,
+      list = dialog.querySelector("ul"),
+      { name } = form.elements;
+    dialog.querySelector("h2").textContent = title;
+    dialog.querySelector("[type=submit]").textContent = word;
+    name.value = this.file || (word === "Save" ? `${this.facts.unit}.txt` : "");
+    list.replaceChildren(
+      ...names.map((file) => {
+        const item = document.createElement("li"),
+          button = document.createElement("button");
+        button.type = "button";
+        button.className = "mono";
+        button.textContent = file;
+        button.addEventListener("click", () => {
+          name.value = file;
+        });
+        button.addEventListener("dblclick", () => form.requestSubmit());
+        item.append(button);
+        return item;
+      }),
+    );
+    form.onsubmit = async (event) => {
+      event.preventDefault();
+      if (name.value && (await deed(name.value))) dialog.close();
+    };
+    dialog.showModal();
+    name.focus();
+    name.select();
+  }
+
+  say(text, kind = "") {
+    for (const told of this.root.querySelectorAll(".program-told")) {
+      told.textContent = text;
+      told.dataset.kind = kind;
+    }
+  }
+
+  /* A call; its error is shown, and undefined comes back. */
+  async ask(name, ...values) {
+    try {
+      return await detent.call(name, ...values);
+    } catch (error) {
+      this.say(error.message, "bad");
+      detent.toast(error.message, "error");
+      return undefined;
+    }
+  }
+}
+
+detent.part("program", (root) => {
+  const program = new Program(root);
+  root.program = program; // for tests and for the curious
+  program.open();
+  return () => program.close();
+});

@@ -1,0 +1,76 @@
+/* The feed of the scope: a WebSocket on which the page asks for a view and gets frames, as fast as it can paint them.
+
+   A frame is binary: the length of a header (uint32, little-endian), the header (JSON), zeros up to a multiple of 8,
+   and behind each other for each trace the low and the high values of its columns (float32, what they are more than the
+   trace's `base`). The header has begin and width of the columns in ns, and their count. The server sends the next frame when the page has acknowledged the last. */
+
+export class Feed {
+  constructor(url, { onFrame, onNews, onFile, onState }) {
+    Object.assign(this, { url, onFrame, onNews, onFile, onState });
+    this.waiting = []; // messages to send once there is a connection
+    this.wait = 500; // ms before the next attempt
+    this.closed = false;
+    this.connect();
+  }
+
+  connect() {
+    this.socket = new WebSocket(this.url);
+    this.socket.binaryType = "arraybuffer";
+    this.socket.onopen = () => {
+      this.wait = 500;
+      this.onState(true);
+      for (const text of this.waiting.splice(0)) this.socket.send(text);
+      if (this.view) this.socket.send(this.view);
+    };
+    this.socket.onmessage = ({ data }) => {
+      if (typeof data === "string") this.onNews(JSON.parse(data));
+      else {
+        const frame = decode(data);
+        if (frame.file) this.onFile(frame);
+        else this.onFrame(frame);
+      }
+    };
+    this.socket.onclose = () => {
+      this.onState(false);
+      if (!this.closed) setTimeout(() => this.closed || this.connect(), (this.wait = Math.min(this.wait * 1.6, 5000)));
+    };
+  }
+
+  /* Ask for a view; the last one counts. */
+  ask(view) {
+    this.view = JSON.stringify({ view });
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(this.view);
+  }
+
+  /* Ask for something else, once. */
+  say(message) {
+    const text = JSON.stringify(message);
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(text);
+    else this.waiting.push(text);
+  }
+
+  painted() {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send("");
+  }
+
+  close() {
+    this.closed = true;
+    this.socket.close();
+  }
+}
+
+const filled = (length) => (length + 7) & ~7;
+
+function decode(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  let at = filled(4 + length);
+  if (header.file) return { ...header, bytes: new Uint8Array(buffer, at) };
+  const { count } = header;
+  for (const trace of header.traces) {
+    trace.low = new Float32Array(buffer, at, count);
+    trace.high = new Float32Array(buffer, (at += 4 * count), count);
+    at += 4 * count;
+  }
+  return header;
+}

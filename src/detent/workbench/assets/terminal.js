@@ -1,0 +1,292 @@
+// The page Terminal: rows of a line as they come, lines and scripts to send.
+
+const { part, on, frame, get, call, toast, seconds, remembered, remember } = window.detent;
+
+const MOST = 1500; // rows on the page
+const EVERY = 150; // ms between two looks at a line
+const MOST_SAID = 50;
+const RAW = "raw";
+
+/** The bytes that a person writes with \r, \n, \t, \\ and \xHH, one character a byte. */
+function bytes(text) {
+  return text.replace(/\\(r|n|t|\\|x[0-9a-fA-F]{2})/g, (whole, one) =>
+    one[0] === "x" ? String.fromCharCode(parseInt(one.slice(1), 16)) : { r: "\r", n: "\n", t: "\t", "\\": "\\" }[one]);
+}
+
+part("terminal", (box) => {
+  const facts = JSON.parse(box.dataset.lines);
+  const names = Object.keys(facts);
+  const role = (name) => box.querySelector(`[data-role="${name}"]`);
+  const rows = role("rows");
+  const talk = box.querySelector(".talk");
+  const text = role("text");
+  const to = role("to");
+  const script = role("script");
+  const numbers = role("numbers");
+  let line = names.includes(remembered("line")) ? remembered("line") : names[0];
+  let next = 0;
+  let cut = null;
+  let asking = false;
+  let looked = 0;
+  let seen = null;
+  let timer = 0;
+  let kept = 0;
+  let said = [];
+  let back = 0;
+
+  // -- what was said --
+
+  function row(one) {
+    const element = document.createElement("div");
+    element.className = `said${one.sender ? "" : " host"}${one.wrong ? " wrong" : ""}`;
+    element.dataset.number = one.number;
+    const when = document.createElement("span");
+    when.className = "when";
+    when.textContent = seconds(one.begin);
+    const who = document.createElement("span");
+    who.className = "who";
+    who.textContent = one.sender ? `\u2190 ${one.sender}` : "\u2192 host";
+    const what = document.createElement("span");
+    what.className = "what";
+    for (const [kind, shown, meaning, hex] of one.parts) {
+      const chip = document.createElement("span");
+      chip.className = `chip ${kind}`;
+      chip.textContent = shown;
+      chip.dataset.help = `${meaning || kind} \u00b7 ${hex}`;
+      const small = document.createElement("i");
+      small.textContent = hex;
+      chip.append(small);
+      what.append(chip);
+    }
+    if (one.note) {
+      const note = document.createElement("span");
+      note.className = "note";
+      note.textContent = one.note;
+      what.append(note);
+    }
+    element.append(when, who, what);
+    return element;
+  }
+
+  const atEnd = () => rows.scrollHeight - rows.scrollTop - rows.clientHeight < 40;
+
+  function toEnd() {
+    rows.scrollTop = rows.scrollHeight;
+    talk.classList.remove("away");
+  }
+
+  async function look() {
+    if (asking || document.hidden) return;
+    asking = true;
+    looked = performance.now();
+    const mine = line;
+    try {
+      let told = await call("terminal", mine, next);
+      if (mine !== line) return;
+      if (cut !== null && told.cut !== cut) {
+        next = 0;
+        rows.replaceChildren();
+        told = await call("terminal", mine, 0);
+        if (mine !== line) return;
+      }
+      cut = told.cut;
+      const stay = !atEnd();
+      while (rows.lastChild && Number(rows.lastChild.dataset.number) >= told.first) rows.lastChild.remove();
+      for (const one of told.rows) rows.append(row(one));
+      while (rows.children.length > MOST) rows.firstChild.remove();
+      next = told.next;
+      if (!rows.children.length && !rows.dataset.empty) rows.dataset.empty = "yes";
+      if (!stay) toEnd();
+      else talk.classList.toggle("away", rows.scrollHeight > rows.clientHeight && stay);
+    } catch {
+      /* the connection is told elsewhere */
+    } finally {
+      asking = false;
+    }
+  }
+
+  function soon() {
+    const now = get("now");
+    if (now === seen || timer) return;
+    const wait = Math.max(0, looked + EVERY - performance.now());
+    timer = setTimeout(() => {
+      timer = 0;
+      seen = get("now");
+      look();
+    }, wait);
+  }
+
+  function choose(name) {
+    line = name;
+    remember("line", name);
+    for (const tab of box.querySelectorAll("[data-line]")) tab.setAttribute("aria-selected", tab.dataset.line === name ? "true" : "false");
+    for (const end of box.querySelectorAll("[data-ends]")) end.hidden = end.dataset.ends !== name;
+    to.replaceChildren(...facts[name].units.map((unit) => new Option(unit, unit)), new Option("bytes", RAW));
+    to.hidden = false;
+    rows.replaceChildren();
+    next = 0;
+    cut = null;
+    said = JSON.parse(remembered(`said.${name}`) || "[]");
+    back = said.length;
+    fillSaid();
+    showScript();
+    progress();
+    look();
+  }
+
+  // -- a line to send --
+
+  function fillSaid() {
+    box.querySelector("#said").replaceChildren(...[...new Set(said)].reverse().map((one) => new Option(one)));
+  }
+
+  function hint() {
+    const here = role("hint");
+    here.replaceChildren();
+    if (to.value === RAW) {
+      here.textContent = "Bytes as they are: \\r, \\n, \\t and \\xHH stand for what cannot be typed.";
+      return;
+    }
+    const written = text.value.trim();
+    const found = (facts[line].words[to.value] || []).find(([spelling]) => written.startsWith(spelling));
+    if (!found) {
+      here.textContent = written ? "" : "Address, checksum and the end of the frame are added.";
+      return;
+    }
+    const [, ...rows] = found;
+    rows.forEach((row, n) => {
+      const name = document.createElement("b");
+      const colon = row.indexOf(": ");
+      name.textContent = row.slice(0, colon).trim();
+      here.append(n ? " \u2002or\u2002 " : "", name, ` \u2002${row.slice(colon + 2)}`);
+    });
+    here.dataset.help = rows.join("\n");
+  }
+
+  role("say").addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const written = text.value;
+    if (!written) return;
+    said = [...said.filter((one) => one !== written), written].slice(-MOST_SAID);
+    back = said.length;
+    remember(`said.${line}`, JSON.stringify(said));
+    fillSaid();
+    text.value = "";
+    hint();
+    try {
+      if (to.value === RAW) await call("send", line, bytes(written));
+      else await call("type", to.value, written);
+      toEnd();
+      look();
+    } catch (error) {
+      toast(error.message, "error");
+      if (!text.value) text.value = written; // to be mended
+    }
+  });
+  text.addEventListener("input", hint);
+  to.addEventListener("change", hint);
+  text.addEventListener("keydown", (event) => {
+    const by = { ArrowUp: -1, ArrowDown: 1 }[event.key];
+    if (!by || !said.length) return;
+    event.preventDefault();
+    back = Math.max(0, Math.min(said.length, back + by));
+    text.value = said[back] || "";
+    hint();
+  });
+
+  // -- a script --
+
+  const draftName = () => `script.${line}`;
+
+  async function showScript() {
+    const mine = line;
+    script.value = role("file").value = "";
+    renumber();
+    const draft = await call("draft", draftName()).catch(() => null);
+    if (mine !== line || !draft) return;
+    script.value = draft.text;
+    role("file").value = draft.file;
+    renumber();
+  }
+
+  function renumber() {
+    const count = script.value.split("\n").length;
+    if (numbers.children.length !== count) {
+      numbers.replaceChildren(...Array.from({ length: count }, (_, n) => {
+        const one = document.createElement("div");
+        one.textContent = n + 1;
+        return one;
+      }));
+    }
+    numbers.scrollTop = script.scrollTop;
+  }
+
+  function keep() {
+    clearTimeout(kept);
+    kept = setTimeout(() => call("keep_draft", draftName(), script.value, role("file").value).catch((error) => toast(error.message, "error")), 400);
+  }
+
+  function progress() {
+    const how = get(`script.${line}`) || { running: false, line: 0, told: "" };
+    role("run").disabled = how.running;
+    role("stop").disabled = !how.running;
+    const told = role("told");
+    told.textContent = how.running ? `sending line ${how.line}` : how.told;
+    told.classList.toggle("bad", /^line \d/.test(how.told));
+    [...numbers.children].forEach((one, n) => one.classList.toggle("at", n + 1 === how.line));
+  }
+
+  script.addEventListener("input", () => {
+    renumber();
+    keep();
+  });
+  script.addEventListener("scroll", () => (numbers.scrollTop = script.scrollTop));
+  role("run").addEventListener("click", async () => {
+    const unit = to.value === RAW ? facts[line].units[0] : to.value;
+    try {
+      await call("run_script", line, unit, script.value);
+    } catch (error) {
+      role("told").textContent = error.message;
+      role("told").classList.add("bad");
+    }
+  });
+  role("stop").addEventListener("click", () => call("stop_script", line).catch((error) => toast(error.message, "error")));
+  role("file").addEventListener("focus", async () => {
+    const files = await call("files", [".txt", ".script"]).catch(() => []);
+    box.querySelector("#scripts").replaceChildren(...files.map((name) => new Option(name)));
+  });
+  role("open").addEventListener("click", async () => {
+    try {
+      script.value = await call("read_file", role("file").value);
+      renumber();
+      keep();
+    } catch (error) {
+      toast(error.message, "error");
+    }
+  });
+  role("save").addEventListener("click", async () => {
+    try {
+      toast(`Saved: ${await call("write_file", role("file").value, script.value)}`);
+      keep();
+    } catch (error) {
+      toast(error.message, "error");
+    }
+  });
+
+  role("hex").addEventListener("click", () => {
+    const shown = !rows.classList.contains("with-hex");
+    rows.classList.toggle("with-hex", shown);
+    role("hex").setAttribute("aria-pressed", shown ? "true" : "false");
+  });
+  role("to-end").addEventListener("click", toEnd);
+  rows.addEventListener("scroll", () => talk.classList.toggle("away", !atEnd()));
+  for (const tab of box.querySelectorAll("[data-line]")) tab.addEventListener("click", () => choose(tab.dataset.line));
+
+  const ends = [frame(soon), on("script.", progress)];
+  choose(line);
+  hint();
+  return () => {
+    ends.forEach((end) => end());
+    clearTimeout(timer);
+  };
+});

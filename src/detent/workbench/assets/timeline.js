@@ -1,0 +1,221 @@
+// The time line: everything that is kept of the cell's past, with its marks. Dragging takes the cell there.
+
+const { part, on, frame, call, toast, seconds, get } = window.detent;
+
+const COLOURS = { error: "#ff6b5e", power: "#ffb02e", deed: "#7fe3d0", breakpoint: "#ff8ad0", stored: "#8fb8ff" };
+const LEFT = 10; // px of air at both ends
+const NICE = [1, 2, 5];
+
+/** Steps of 1, 2, 5 times a power of ten in which `span` has at most `most` parts. */
+function pitch(span, most) {
+  const raw = span / most;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  return power * (NICE.find((n) => n * power >= raw) || 10);
+}
+
+part("timeline", (box) => {
+  const canvas = document.createElement("canvas");
+  const tag = document.createElement("div");
+  tag.className = "tag";
+  box.append(canvas, tag);
+  const pen = canvas.getContext("2d");
+  let marks = [];
+  let wanted = null; // where a hand holds the time, until the cell is there
+  let asking = false;
+  let dragging = false;
+  let due = true;
+  let shown = "";
+  let news = 0; // counts marks that came
+
+  const begin = () => get("begin") || 0;
+  const end = () => Math.max(get("end") || 0, get("now") || 0, begin() + 1e6);
+  const width = () => Math.max(1, canvas.clientWidth - 2 * LEFT);
+  const x = (t) => LEFT + ((t - begin()) / (end() - begin())) * width();
+  const t = (px) => Math.round(begin() + Math.max(0, Math.min(1, (px - LEFT) / width())) * (end() - begin()));
+
+  function draw() {
+    due = false;
+    const wide = canvas.clientWidth;
+    const high = canvas.clientHeight;
+    const now = wanted === null ? get("now") || 0 : wanted;
+    const span = end() - begin();
+    const every = pitch(span, Math.max(2, wide / 92));
+    const first = Math.ceil(begin() / every) * every;
+    const look = [now, end(), first, first + every].map((at) => Math.round(x(at) * 2)).concat(every, first, wide, high, news).join();
+    if (look === shown) return; // nothing has moved by half a pixel
+    shown = look;
+    const ratio = window.devicePixelRatio || 1;
+    if (canvas.width !== Math.round(wide * ratio) || canvas.height !== Math.round(high * ratio)) {
+      canvas.width = Math.round(wide * ratio);
+      canvas.height = Math.round(high * ratio);
+    }
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, wide, high);
+    const rail = 11;
+    pen.fillStyle = "#0b0f10";
+    pen.beginPath();
+    pen.roundRect(0, 0, wide, 22, 3);
+    pen.fill();
+    pen.fillStyle = "#35565a";
+    pen.fillRect(LEFT, rail - 3, Math.max(0, x(now) - LEFT), 6);
+    pen.fillStyle = "#232b2e"; // what lies behind, while one looks into the past
+    pen.fillRect(x(now), rail - 3, Math.max(0, x(end()) - x(now)), 6);
+
+    const digits = Math.max(0, Math.min(9, 9 - Math.floor(Math.log10(every))));
+    pen.font = '10.5px ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace';
+    pen.textBaseline = "top";
+    pen.fillStyle = "#a9b0b3";
+    pen.strokeStyle = "#4b565a";
+    pen.lineWidth = 1;
+    for (let at = first; at <= end(); at += every) {
+      const px = Math.round(x(at)) + 0.5;
+      pen.beginPath();
+      pen.moveTo(px, 22);
+      pen.lineTo(px, 26);
+      pen.stroke();
+      const text = (at / 1e9).toFixed(digits);
+      const half = pen.measureText(text).width / 2;
+      if (px + half < wide && px - half > 0) pen.fillText(text, px - half, 27);
+      else if (px - half <= 0) pen.fillText(text, 2, 27);
+    }
+    let last = {};
+    for (const [at, kind] of marks) {
+      const px = Math.round(x(at));
+      if (px < 0 || px > wide || last[kind] === px) continue;
+      last[kind] = px;
+      pen.fillStyle = COLOURS[kind] || "#c3c9cc";
+      if (kind === "error" || kind === "breakpoint") {
+        pen.beginPath();
+        pen.moveTo(px, 5);
+        pen.lineTo(px + 4, 11);
+        pen.lineTo(px, 17);
+        pen.lineTo(px - 4, 11);
+        pen.fill();
+      } else pen.fillRect(px - 1, 4, 2, 14);
+    }
+    const px = x(now);
+    pen.fillStyle = "#eceae4";
+    pen.fillRect(px - 1, 0, 2, 22);
+    pen.beginPath();
+    pen.roundRect(px - 5, 3, 10, 16, 3);
+    pen.fill();
+    pen.fillStyle = "#23282b";
+    pen.fillRect(px - 0.5, 7, 1, 8);
+    box.setAttribute("aria-valuemin", (begin() / 1e9).toFixed(3));
+    box.setAttribute("aria-valuemax", (end() / 1e9).toFixed(3));
+    box.setAttribute("aria-valuenow", (now / 1e9).toFixed(6));
+    box.setAttribute("aria-valuetext", `${(now / 1e9).toFixed(6)} s`);
+  }
+
+  /** Take the cell to `wanted`; while it is on its way the newest wish is kept, no queue of them. */
+  async function follow() {
+    if (asking) return;
+    asking = true;
+    try {
+      while (wanted !== null) {
+        const aim = wanted;
+        await call("rewind", aim);
+        if (wanted === aim && !dragging) wanted = null;
+        else if (wanted === aim) break;
+      }
+    } catch (error) {
+      wanted = null;
+      toast(error.message, "error");
+    }
+    asking = false;
+    if (dragging && wanted !== null && wanted !== get("now")) return;
+    plan();
+  }
+
+  function plan() {
+    if (!due) {
+      due = true;
+      requestAnimationFrame(draw);
+    }
+  }
+
+  function near(px) {
+    let best = null;
+    for (const mark of marks) {
+      const far = Math.abs(x(mark[0]) - px);
+      if (far < 7 && (best === null || far < best[1])) best = [mark, far];
+    }
+    return best && best[0];
+  }
+
+  function point(event) {
+    const px = event.clientX - box.getBoundingClientRect().left;
+    const mark = near(px);
+    const at = mark && !dragging ? mark[0] : t(px);
+    tag.textContent = mark ? `${seconds(mark[0])} s  ${mark[2] ? `${mark[2]}: ` : ""}${mark[3]}` : `${seconds(at)} s`;
+    tag.classList.add("shown");
+    const half = tag.offsetWidth / 2;
+    tag.style.left = `${Math.max(half, Math.min(px, box.clientWidth - half))}px`;
+    return mark ? mark[0] : at;
+  }
+
+  box.addEventListener("pointerdown", (event) => {
+    event.preventDefault();
+    box.focus({ preventScroll: true });
+    box.setPointerCapture(event.pointerId);
+    dragging = true;
+    wanted = point(event);
+    follow();
+    plan();
+  });
+  box.addEventListener("pointermove", (event) => {
+    const at = point(event);
+    if (!dragging) return;
+    wanted = at;
+    follow();
+    plan();
+  });
+  const drop = () => {
+    if (!dragging) return;
+    dragging = false;
+    if (wanted !== null) follow();
+    tag.classList.remove("shown");
+  };
+  box.addEventListener("pointerup", drop);
+  box.addEventListener("pointercancel", drop);
+  box.addEventListener("pointerleave", () => dragging || tag.classList.remove("shown"));
+  box.addEventListener("keydown", (event) => {
+    const coarse = (end() - begin()) / 100;
+    const far = { ArrowLeft: -coarse, ArrowRight: coarse, PageUp: -10 * coarse, PageDown: 10 * coarse }[event.key];
+    let aim = null;
+    if (far) aim = (get("now") || 0) + far;
+    else if (event.key === "Home") aim = begin();
+    else if (event.key === "End") aim = end();
+    else if (event.key === " ") {
+      event.preventDefault();
+      call(get("held") ? "go" : "hold").catch((error) => toast(error.message, "error"));
+    }
+    if (aim === null) return;
+    event.preventDefault();
+    wanted = Math.round(Math.max(begin(), Math.min(end(), aim)));
+    follow();
+    plan();
+  });
+
+  const ends = [
+    on("marks", (key, value) => {
+      marks = value || [];
+      news += 1;
+      plan();
+    }),
+    frame(plan),
+  ];
+  const resized = new ResizeObserver(plan);
+  resized.observe(box);
+  draw();
+  return () => {
+    for (const end of ends) end();
+    resized.disconnect();
+  };
+});
+
+part("go", (button) => {
+  button.addEventListener("click", () => {
+    call(get("held") ? "go" : "hold").catch((error) => toast(error.message, "error"));
+  });
+});

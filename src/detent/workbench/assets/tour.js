@@ -1,0 +1,80 @@
+// The guided tour: a few stops, dismissed with a key or a click, and remembered.
+
+const { part, remember, remembered } = window.detent;
+
+const STOPS = [
+  ["", "Welcome to the workbench", "A cell of controllers, running now. Everything here is live, and everything can be taken back. Six short stops."],
+  [".unit .panel-head", "Every unit is a front panel", "Its power switch, its state, its position and rate, the instruction it is at, the last error. Lamps are the levels of its pins; hover over anything for what it is."],
+  [".panel-switches, .toggle, button.pin", "Switches, inputs, wires", "Click a switch, an input pin or a strap to change it. Lines are the wires of the cell: green carries a 1."],
+  [".transport", "Time obeys you", "Pause, go on by single events, and run from a thousandth of real time to as fast as it goes. Keys: space, comma and point, [ and ]."],
+  [".history", "Drag back", "The whole past is kept. Drag the time line back, and the cell is as it was then; press go, and it goes on from there."],
+  ["nav.tabs", "And further", "Program: write, load and step a stored program. Terminal: every byte on the lines, explained. Scope and Motion: what the axes do, exact to the pulse."],
+];
+
+let box = null;
+let spot = null;
+let at = 0;
+
+function end() {
+  remember("tour", "seen");
+  box?.remove();
+  spot?.remove();
+  box = spot = null;
+}
+
+function show() {
+  const [selector, title, text] = STOPS[at];
+  const target = selector ? document.querySelector(selector) : null;
+  box.querySelector("h2").textContent = title;
+  box.querySelector("p").textContent = text;
+  box.querySelector(".count").textContent = `${at + 1} of ${STOPS.length}`;
+  box.querySelector(".next").textContent = at + 1 < STOPS.length ? "Next" : "Done";
+  box.querySelector(".before").style.visibility = at ? "visible" : "hidden";
+  if (target) target.scrollIntoView({ block: "nearest" });
+  const mine = box.getBoundingClientRect();
+  let left = (innerWidth - mine.width) / 2;
+  let top = Math.max(60, (innerHeight - mine.height) / 2 - 40);
+  if (target) {
+    const there = target.getBoundingClientRect();
+    spot.style.cssText = `left:${there.left - 4}px;top:${there.top - 4}px;width:${there.width + 8}px;height:${there.height + 8}px`;
+    left = Math.max(12, Math.min(there.left, innerWidth - mine.width - 12));
+    top = there.bottom + mine.height + 16 < innerHeight ? there.bottom + 12 : Math.max(12, there.top - mine.height - 12);
+  } else spot.style.cssText = "left:50%;top:-20px;width:0;height:0";
+  box.style.left = `${left}px`;
+  box.style.top = `${top}px`;
+  box.querySelector(".next").focus({ preventScroll: true });
+}
+
+function start() {
+  if (box) return;
+  at = 0;
+  spot = document.createElement("div");
+  spot.className = "tour-spot";
+  box = document.createElement("section");
+  box.className = "tour";
+  box.setAttribute("role", "dialog");
+  box.setAttribute("aria-label", "Guided tour");
+  box.innerHTML = `<h2></h2><p></p><div class="row"><button class="key small bare skip">Skip</button><span class="quiet count"></span>
+    <span class="row"><button class="key small before">Back</button><button class="key small primary next"></button></span></div>`;
+  document.body.append(spot, box);
+  box.querySelector(".skip").addEventListener("click", end);
+  box.querySelector(".before").addEventListener("click", () => {
+    at -= 1;
+    show();
+  });
+  box.querySelector(".next").addEventListener("click", () => {
+    at += 1;
+    if (at < STOPS.length) show();
+    else end();
+  });
+  box.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") end();
+  });
+  show();
+}
+
+document.addEventListener("detent-tour", start);
+part("tour-button", (button) => {
+  button.addEventListener("click", start);
+  if (remembered("tour") !== "seen" && location.pathname === "/") setTimeout(start, 600); // when the page stands
+});

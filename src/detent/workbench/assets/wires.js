@@ -1,0 +1,188 @@
+// The wires of a cell, drawn between the jacks of its panels: along the gaps between them, never across one.
+
+const { part, on } = window.detent;
+
+const ROUND = 6; // px, of the corners
+const OUTSIDE = 46; // px beside the outermost panels, at most
+const NS = "http://www.w3.org/2000/svg";
+
+/** A path through points with right angles, its corners rounded. */
+function rounded(points) {
+  let path = `M${points[0][0]} ${points[0][1]}`;
+  for (let n = 1; n < points.length - 1; n += 1) {
+    const [[ax, ay], [bx, by], [cx, cy]] = [points[n - 1], points[n], points[n + 1]];
+    const into = Math.hypot(bx - ax, by - ay);
+    const out = Math.hypot(cx - bx, cy - by);
+    const r = Math.min(ROUND, into / 2, out / 2);
+    if (r < 0.5) {
+      path += `L${bx} ${by}`;
+      continue;
+    }
+    path += `L${bx + ((ax - bx) / into) * r} ${by + ((ay - by) / into) * r}`;
+    path += `Q${bx} ${by} ${bx + ((cx - bx) / out) * r} ${by + ((cy - by) / out) * r}`;
+  }
+  const last = points[points.length - 1];
+  return `${path}L${last[0]} ${last[1]}`;
+}
+
+/** The panels in `box`, and the gaps: columns between them as [left, right]. */
+function gaps(box, frame) {
+  const cards = [...box.querySelectorAll(".panel")].map((card) => {
+    const at = card.getBoundingClientRect();
+    return { card, left: at.left - frame.left, right: at.right - frame.left, top: at.top - frame.top, bottom: at.bottom - frame.top };
+  });
+  const lefts = [...new Set(cards.map((card) => Math.round(card.left)))].sort((a, b) => a - b);
+  const columns = lefts.map((left) => {
+    const mine = cards.filter((card) => Math.round(card.left) === left);
+    return { left, right: Math.max(...mine.map((card) => card.right)) };
+  });
+  const last = columns[columns.length - 1].right;
+  const between = columns.map((column, n) => [n ? columns[n - 1].right : Math.max(0, column.left - OUTSIDE), column.left]);
+  between.push([last, Math.min(frame.width, last + OUTSIDE)]);
+  for (const one of cards) one.column = lefts.indexOf(Math.round(one.left));
+  return { cards, between };
+}
+
+/** Heights at which a wire can run from x1 to x2 without touching a panel. */
+function passages(cards, x1, x2, height) {
+  const inWay = cards.filter((card) => card.right > Math.min(x1, x2) && card.left < Math.max(x1, x2));
+  const spans = inWay.map((card) => [card.top, card.bottom]).sort((a, b) => a[0] - b[0]);
+  const free = [];
+  let low = 0;
+  for (const [top, bottom] of spans) {
+    if (top - low > 6) free.push([low, top]);
+    low = Math.max(low, bottom);
+  }
+  free.push([low, Math.max(height, low + 20)]);
+  return free;
+}
+
+part("wires", (box) => {
+  const svg = box.querySelector("svg.wires");
+  const wires = JSON.parse(box.dataset.wires);
+  let ends = [];
+  let planned = 0;
+
+  function jack(name) {
+    const element = box.querySelector(`[data-jack="${CSS.escape(name)}"]`);
+    if (!element) return null;
+    const dot = element.querySelector(".jack").getBoundingClientRect();
+    return { element, card: element.closest(".panel"), side: element.dataset.side, dot };
+  }
+
+  function draw() {
+    planned = 0;
+    const frame = box.getBoundingClientRect();
+    if (!frame.width) return;
+    const { cards, between } = gaps(box, frame);
+    const place = (end) => {
+      const card = cards.find((one) => one.card === end.card);
+      const gap = end.side === "left" ? card.column : card.column + 1;
+      return { x: end.dot.left + end.dot.width / 2 - frame.left, y: end.dot.top + end.dot.height / 2 - frame.top, gap };
+    };
+    // which wire uses which gaps
+    const routes = [];
+    const users = new Map(); // gap or passage -> the wires in it, in order
+    const use = (key, wire) => {
+      if (!users.has(key)) users.set(key, []);
+      if (!users.get(key).includes(wire)) users.get(key).push(wire);
+    };
+    wires.forEach(([source, targets], wire) => {
+      const from = jack(source);
+      if (!from) return;
+      const a = place(from);
+      for (const target of targets) {
+        const to = jack(target);
+        if (!to) continue;
+        const b = place(to);
+        use(a.gap, wire);
+        use(b.gap, wire);
+        let passage = null;
+        if (a.gap !== b.gap) {
+          const middle = (gap) => (between[gap][0] + between[gap][1]) / 2;
+          const free = passages(cards, middle(a.gap), middle(b.gap), frame.height);
+          const far = ([low, high]) => {
+            const y = (low + high) / 2;
+            return Math.abs(a.y - y) + Math.abs(b.y - y);
+          };
+          passage = free.reduce((best, one) => (far(one) < far(best) ? one : best));
+          use(`${Math.round(passage[0])}`, wire);
+        }
+        routes.push({ wire, a, b, passage });
+      }
+    });
+    const lane = (key, wire, low, high, widest) => {
+      const all = users.get(key);
+      const step = Math.min(widest, (high - low) / (all.length + 1));
+      return (low + high) / 2 + (all.indexOf(wire) - (all.length - 1) / 2) * step;
+    };
+    for (const end of ends) end();
+    ends = [];
+    svg.replaceChildren();
+    const groups = new Map();
+    for (const { wire, a, b, passage } of routes) {
+      const x1 = lane(a.gap, wire, ...between[a.gap], 9);
+      const x2 = lane(b.gap, wire, ...between[b.gap], 9);
+      const points = [[a.x, a.y], [x1, a.y]];
+      if (passage) {
+        const low = passage[0];
+        const high = Math.min(passage[1], low + 34);
+        const y = lane(`${Math.round(low)}`, wire, passage[1] - low > 60 && low > 0 ? low : passage[1] - (high - low), passage[1] - low > 60 && low > 0 ? high : passage[1], 7);
+        points.push([x1, y], [x2, y]);
+      }
+      points.push([x2, b.y], [b.x, b.y]);
+      if (!groups.has(wire)) groups.set(wire, document.createElementNS(NS, "g"));
+      const d = rounded(points.map(([x, y]) => [Math.round(x * 2) / 2, Math.round(y * 2) / 2]));
+      for (const kind of ["halo", "line"]) {
+        const path = document.createElementNS(NS, "path");
+        path.setAttribute("class", kind);
+        path.setAttribute("d", d);
+        groups.get(wire).append(path);
+      }
+    }
+    for (const [wire, group] of groups) {
+      svg.append(group);
+      const [source, targets] = wires[wire];
+      for (const end of [source, ...targets]) {
+        const key = keyOf(end);
+        if (!key) continue;
+        ends.push(on(key, (changed, value) => {
+          if (changed === key) group.dataset.value = value === null ? "" : String(value);
+        }));
+        break;
+      }
+      group.dataset.wire = source;
+    }
+  }
+
+  /** The key of the level at an end of a wire: a switch's, or a pin's. A motor's pins tell none. */
+  function keyOf(end) {
+    const dot = end.indexOf(".");
+    if (dot < 0) return `s.${end}.level`;
+    const pin = box.querySelector(`[data-jack="${CSS.escape(end)}"]`);
+    return pin && pin.dataset.level ? pin.dataset.level : null;
+  }
+
+  function plan() {
+    if (!planned) planned = requestAnimationFrame(draw);
+  }
+
+  const light = (event) => {
+    const element = event.target.closest("[data-jack]");
+    const name = element && element.dataset.jack;
+    for (const group of svg.children) {
+      const [source, targets] = wires.find(([from]) => from === group.dataset.wire) || ["", []];
+      group.classList.toggle("lit", Boolean(name) && (source === name || targets.includes(name)));
+    }
+  };
+  box.addEventListener("pointerover", light);
+  box.addEventListener("focusin", light);
+  const resized = new ResizeObserver(plan);
+  resized.observe(box);
+  for (const card of box.querySelectorAll(".panel")) resized.observe(card);
+  plan();
+  return () => {
+    resized.disconnect();
+    for (const end of ends) end();
+  };
+});

@@ -1,0 +1,440 @@
+// What every page of the workbench shares: the live table and the markup bound to it, calls, help, theme, keyboard.
+// The conventions are told in detent/workbench/pages/__init__.py.
+
+const values = new Map(); // the live table, as far as this window knows it
+const bound = new Map(); // key -> Set of [element, kind]
+const listeners = []; // [prefix, function]
+const frames = new Set();
+const parts = new Map(); // name -> setup
+const living = new Map(); // element with data-part -> what ends it
+const waiting = new Map(); // number of a call -> [resolve, reject]
+const opening = []; // what is called when there is a connection
+const PATIENCE = 8000; // ms that a call waits for one
+let socket = null;
+let calls = 0;
+let pause = 250; // ms before the next attempt to connect
+
+// -- the socket -----------------------------------------------------------------------------------------
+
+function connect() {
+  const scheme = location.protocol === "https:" ? "wss:" : "ws:";
+  socket = new WebSocket(`${scheme}//${location.host}/live`);
+  socket.onopen = () => {
+    pause = 250;
+    document.documentElement.dataset.link = "up";
+    for (const go of opening.splice(0)) go();
+  };
+  socket.onmessage = (event) => {
+    const told = JSON.parse(event.data);
+    if (told.set) take(told.set);
+    else if (waiting.has(told.id)) {
+      const [resolve, reject] = waiting.get(told.id);
+      waiting.delete(told.id);
+      if ("error" in told) reject(new Error(told.error));
+      else resolve(told.value);
+    }
+  };
+  socket.onclose = () => {
+    document.documentElement.dataset.link = "down";
+    for (const [, reject] of waiting.values()) reject(new Error("the workbench does not answer"));
+    waiting.clear();
+    setTimeout(connect, pause);
+    pause = Math.min(pause * 2, 4000);
+  };
+}
+
+/** Make a call; it waits a while for the connection, if there is none. */
+async function call(name, ...args) {
+  if (!socket || socket.readyState !== WebSocket.OPEN) await connected();
+  return new Promise((resolve, reject) => {
+    calls += 1;
+    waiting.set(calls, [resolve, reject]);
+    socket.send(JSON.stringify({ call: name, args, id: calls }));
+  });
+}
+
+function connected() {
+  return new Promise((resolve, reject) => {
+    const late = setTimeout(() => reject(new Error("the workbench does not answer")), PATIENCE);
+    opening.push(() => {
+      clearTimeout(late);
+      resolve();
+    });
+  });
+}
+
+/** The same for a hand at the page: an error is shown, and nothing is thrown. */
+async function deed(name, ...args) {
+  try {
+    return await call(name, ...args);
+  } catch (error) {
+    toast(error.message, "error");
+    return null;
+  }
+}
+
+// -- the table ------------------------------------------------------------------------------------------
+
+function take(changed) {
+  for (const [key, value] of Object.entries(changed)) {
+    values.set(key, value);
+    const there = bound.get(key);
+    if (there) {
+      for (const one of there) {
+        if (one[0].isConnected) show(one[0], one[1], value);
+        else there.delete(one);
+      }
+    }
+    for (const [prefix, heard] of listeners) if (key.startsWith(prefix)) heard(key, value);
+  }
+  for (const drawn of frames) drawn();
+}
+
+const KINDS = ["live", "level", "var", "pressed"];
+
+function show(element, kind, value) {
+  switch (kind) {
+    case "live": {
+      const form = FORMS[element.dataset.form] || FORMS.plain;
+      const text = form(value);
+      if (element.textContent !== text) element.textContent = text;
+      break;
+    }
+    case "level":
+      element.dataset.value = value === null ? "" : String(value);
+      break;
+    case "var":
+      element.style.setProperty("--value", value === null ? 0 : value);
+      break;
+    case "pressed":
+      element.setAttribute("aria-pressed", value ? "true" : "false");
+      break;
+  }
+}
+
+function bind(element) {
+  for (const kind of KINDS) {
+    const key = element.dataset[kind];
+    if (!key) continue;
+    if (!bound.has(key)) bound.set(key, new Set());
+    bound.get(key).add([element, kind]);
+    if (values.has(key)) show(element, kind, values.get(key));
+  }
+}
+
+const SELECTOR = KINDS.map((kind) => `[data-${kind}]`).join(",");
+
+function appear(root) {
+  if (root.matches(SELECTOR)) bind(root);
+  for (const element of root.querySelectorAll(SELECTOR)) bind(element);
+  if (root.matches("[data-part]")) begin(root);
+  for (const element of root.querySelectorAll("[data-part]")) begin(element);
+}
+
+function begin(element) {
+  const setup = parts.get(element.dataset.part);
+  if (setup && !living.has(element)) living.set(element, setup(element) || (() => {}));
+}
+
+function watchDocument() {
+  const look = (records) => {
+    let gone = false;
+    for (const record of records) {
+      for (const node of record.addedNodes) if (node.nodeType === 1) appear(node);
+      gone = gone || record.removedNodes.length > 0;
+    }
+    if (gone) {
+      for (const [element, end] of living) {
+        if (!element.isConnected) {
+          living.delete(element);
+          end();
+        }
+      }
+    }
+  };
+  new MutationObserver(look).observe(document.documentElement, { childList: true, subtree: true });
+  appear(document.documentElement);
+}
+
+function part(name, setup) {
+  parts.set(name, setup);
+  for (const element of document.querySelectorAll(`[data-part="${name}"]`)) begin(element);
+}
+
+function on(prefix, heard) {
+  const entry = [prefix, heard];
+  listeners.push(entry);
+  for (const [key, value] of values) if (key.startsWith(prefix)) heard(key, value);
+  return () => listeners.splice(listeners.indexOf(entry), 1);
+}
+
+function frame(drawn) {
+  frames.add(drawn);
+  return () => frames.delete(drawn);
+}
+
+// -- how values are written -----------------------------------------------------------------------------
+
+const THIN = "\u2009";
+const MINUS = "\u2212";
+
+function grouped(number) {
+  const text = Math.abs(number).toString().replace(/\B(?=(\d{3})+$)/g, THIN);
+  return number < 0 ? MINUS + text : text;
+}
+
+/** Nanoseconds as seconds, to the microsecond. */
+function seconds(ns) {
+  if (ns === null || ns === undefined) return "\u2013";
+  const micro = Math.floor(ns / 1000);
+  const whole = Math.floor(micro / 1e6);
+  const rest = String(micro % 1e6).padStart(6, "0");
+  return `${grouped(whole)}.${rest.slice(0, 3)}${THIN}${rest.slice(3)}`;
+}
+
+const FORMS = {
+  plain: (value) => (value === null || value === undefined ? "" : String(value)),
+  time: seconds,
+  steps: (value) => (value === null || value === undefined ? "\u2013" : (value > 0 ? "+" : "") + grouped(Math.round(value))),
+  count: (value) => (value === null || value === undefined ? "\u2013" : grouped(Math.round(value))),
+  rate: (value) => (value === null || value === undefined ? "\u2013" : grouped(Math.round(value))),
+  level: (value) => (value === null || value === undefined || value === "" ? "\u00b7" : String(value)),
+  fixed: (value) => (value === null || value === undefined ? "\u2013" : (value < 0 ? MINUS : "") + Math.abs(value).toFixed(2)),
+  pace: (value) => (value === null || value === undefined ? "as fast as it goes" : `${Number(value.toPrecision(3))}\u00d7`),
+};
+
+// -- help, messages -------------------------------------------------------------------------------------
+
+let helpBox = null;
+let helped = null;
+let helpSoon = 0;
+
+function showHelp(element) {
+  const text = element.dataset.help;
+  if (!text || !element.isConnected) return;
+  if (!helpBox) {
+    helpBox = document.createElement("div");
+    helpBox.className = "help";
+    helpBox.setAttribute("role", "tooltip");
+    helpBox.id = "help";
+    document.body.append(helpBox);
+  }
+  helped = element;
+  element.setAttribute("aria-describedby", "help");
+  helpBox.textContent = text;
+  helpBox.classList.add("shown");
+  const at = element.getBoundingClientRect();
+  const mine = helpBox.getBoundingClientRect();
+  const left = Math.max(8, Math.min(at.left + at.width / 2 - mine.width / 2, innerWidth - mine.width - 8));
+  const above = at.top - mine.height - 8;
+  helpBox.style.left = `${Math.round(left)}px`;
+  helpBox.style.top = `${Math.round(above > 4 ? above : at.bottom + 8)}px`;
+}
+
+function hideHelp() {
+  clearTimeout(helpSoon);
+  if (helped) helped.removeAttribute("aria-describedby");
+  if (helpBox) helpBox.classList.remove("shown");
+  helped = null;
+}
+
+function listenForHelp() {
+  document.addEventListener("pointerover", (event) => {
+    const element = event.target.closest && event.target.closest("[data-help]");
+    if (element === helped) return;
+    hideHelp();
+    if (element && event.pointerType === "mouse") helpSoon = setTimeout(() => showHelp(element), 350);
+  });
+  document.addEventListener("pointerdown", (event) => {
+    hideHelp();
+    const element = event.target.closest("[data-help]");
+    if (element && event.pointerType !== "mouse") helpSoon = setTimeout(() => showHelp(element), 500);
+  });
+  document.addEventListener("pointerup", () => clearTimeout(helpSoon));
+  document.addEventListener("scroll", hideHelp, true);
+  document.addEventListener("focusin", (event) => {
+    const element = event.target.closest("[data-help]");
+    if (element && event.target.matches(":focus-visible")) showHelp(element);
+  });
+  document.addEventListener("focusout", hideHelp);
+}
+
+function toast(text, kind = "note") {
+  let shelf = document.getElementById("toasts");
+  if (!shelf) {
+    shelf = document.createElement("div");
+    shelf.id = "toasts";
+    shelf.setAttribute("role", "status");
+    shelf.setAttribute("aria-live", "polite");
+    document.body.append(shelf);
+  }
+  for (const old of shelf.children) if (old.textContent === text) old.remove();
+  const one = document.createElement("div");
+  one.className = `toast ${kind}`;
+  one.textContent = text;
+  one.addEventListener("click", () => one.remove());
+  shelf.append(one);
+  while (shelf.children.length > 4) shelf.firstChild.remove();
+  setTimeout(() => one.remove(), kind === "error" ? 9000 : 4000);
+}
+
+// -- deeds by hand --------------------------------------------------------------------------------------
+
+function argument(written) {
+  if (typeof written !== "string") return written;
+  if (written.startsWith("!")) return values.get(written.slice(1)) ? 0 : 1;
+  if (written.startsWith("=")) return values.get(written.slice(1));
+  return written;
+}
+
+function listenForDeeds() {
+  document.addEventListener("click", (event) => {
+    const element = event.target.closest("[data-do]");
+    if (!element || element.disabled) return;
+    deed(element.dataset.do, ...JSON.parse(element.dataset.args || "[]").map(argument));
+  });
+  document.addEventListener("click", (event) => {
+    // a pointer does not leave the focus at a button or tab, where the next space would press it once more
+    if (event.detail > 0) event.target.closest("button, a")?.blur();
+  });
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const at = event.target;
+    if (at.closest("input, textarea, select, [contenteditable], .cm-editor, [role=slider], [role=dialog]")) return;
+    const keys = { ".": "step_event", ",": "step_back", "[": "slower", "]": "faster" };
+    if (event.key === " ") {
+      if (at.closest("button, a, summary")) return; // it is theirs
+      event.preventDefault();
+      deed(values.get("held") ? "go" : "hold");
+    } else if (event.key in keys) {
+      event.preventDefault();
+      if (!event.repeat || event.key === "." || event.key === ",") deed(keys[event.key]);
+    } else if (event.key === "?") {
+      document.dispatchEvent(new CustomEvent("detent-tour"));
+    } else if (/^[1-9]$/.test(event.key)) {
+      const tab = document.querySelectorAll("nav.tabs a")[Number(event.key) - 1];
+      if (tab) tab.click();
+    }
+  });
+}
+
+// -- theme, tabs ----------------------------------------------------------------------------------------
+
+const themed = [];
+const darkOutside = matchMedia("(prefers-color-scheme: dark)");
+
+function remembered(name) {
+  try {
+    return localStorage.getItem(`detent.${name}`);
+  } catch {
+    return null; // a browser that keeps nothing
+  }
+}
+
+function remember(name, value) {
+  try {
+    localStorage.setItem(`detent.${name}`, value);
+  } catch {
+    /* then it is asked again next time */
+  }
+}
+
+function theme() {
+  const chosen = remembered("theme");
+  return chosen === "light" || chosen === "dark" ? chosen : darkOutside.matches ? "dark" : "light";
+}
+
+function applyTheme() {
+  const now = theme();
+  document.documentElement.dataset.theme = now;
+  if (window.Quasar) window.Quasar.Dark.set(now === "dark");
+  for (const heard of themed) heard(now);
+}
+
+function onTheme(heard) {
+  themed.push(heard);
+  heard(theme());
+  return () => themed.splice(themed.indexOf(heard), 1);
+}
+
+function markTab() {
+  for (const tab of document.querySelectorAll("nav.tabs a")) {
+    const here = tab.getAttribute("href") === location.pathname;
+    if (here) tab.setAttribute("aria-current", "page");
+    else tab.removeAttribute("aria-current");
+  }
+  const here = document.querySelector("nav.tabs a[aria-current]");
+  const title = document.documentElement.dataset.title || "Detent";
+  document.title = here ? `${here.dataset.name} \u2013 ${title}` : title;
+}
+
+function followTabs() {
+  for (const name of ["pushState", "replaceState"]) {
+    const before = history[name];
+    history[name] = function (...args) {
+      const result = before.apply(this, args);
+      markTab();
+      return result;
+    };
+  }
+  addEventListener("popstate", markTab);
+  part("tabs", markTab);
+  part("theme", (button) => {
+    button.addEventListener("click", () => {
+      remember("theme", theme() === "dark" ? "light" : "dark");
+      applyTheme();
+    });
+  });
+  part("restart", (button) => {
+    let armed = 0;
+    const rest = () => {
+      armed = 0;
+      button.classList.remove("armed");
+    };
+    button.addEventListener("click", () => {
+      if (!armed) {
+        armed = setTimeout(rest, 3000);
+        button.classList.add("armed");
+        toast("Click once more to begin anew: the past and what is in memory are lost, drafts and EEPROMs are not.");
+        return;
+      }
+      clearTimeout(armed);
+      rest();
+      deed("restart");
+    });
+  });
+  part("pace", (select) => {
+    select.addEventListener("change", () => deed("pace", select.value === "max" ? null : Number(select.value)));
+    return on("pace", (key, value) => {
+      if (key !== "pace") return;
+      const text = value === null ? "max" : String(value);
+      let choice = [...select.options].find((option) => option.value === text);
+      if (!choice) {
+        choice = new Option(FORMS.pace(value), text);
+        select.add(choice, 0);
+      }
+      select.value = text;
+    });
+  });
+}
+
+window.detent = {
+  part, on, frame, call, deed, toast, onTheme, theme, remembered, remember, seconds, grouped,
+  get: (key) => values.get(key),
+  keys: () => values.keys(),
+  forms: FORMS,
+};
+
+darkOutside.addEventListener("change", applyTheme);
+addEventListener("load", applyTheme);
+applyTheme();
+listenForHelp();
+listenForDeeds();
+followTabs();
+on("crashed", (key, value) => (document.documentElement.dataset.crashed = value ? "yes" : ""));
+on("title", (key, value) => {
+  document.documentElement.dataset.title = value;
+  markTab();
+});
+watchDocument();
+connect();

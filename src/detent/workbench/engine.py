@@ -1,0 +1,460 @@
+"""The process of a cell on the workbench: it serves the cell with its past, does what it is asked, tells what happened.
+
+It is started by `Bench.open`, has a pipe to it on the file descriptor that it is given, and ends when that does.
+"""
+
+import contextlib
+import gc
+import pickle
+import socket
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from detent.assembler import ImageError
+from detent.cell.cell import Cell
+from detent.cell.deeds import Deed, Load, PlaceSwitch, Power, Release, Send, SetPin, SetSwitch, Start, Type
+from detent.cell.description import Description, Problem
+from detent.cell.history import Broken, History
+from detent.cell.recording import Entry
+from detent.cell.stores import Stores
+from detent.controllers import catalogue
+from detent.controllers.device import Powered, Refused, StoreImage
+from detent.lines.line import Line
+from detent.outputs.units import views
+from detent.pins import Level
+from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
+from detent.realtime.images import Images, ImagesUnusable, cell_name
+from detent.realtime.loop import BEHIND, Loop, ServedLine, stopped_by_signals, wake_exactly
+from detent.realtime.pace import Lateness as Counted
+from detent.realtime.pace import Pace, WallNs
+from detent.realtime.service import build_with_images, models, open_endpoints
+from detent.realtime.target import Target, target
+from detent.ticks import SECOND, Ns
+from detent.uart import Chars
+from detent.workbench import look, rotors
+from detent.workbench.messages import (
+    MOST_MARKS,
+    Answer,
+    Ask,
+    Failed,
+    Happened,
+    Lateness,
+    Mark,
+    Marked,
+    Opened,
+    Order,
+    Picture,
+    State,
+)
+from detent.workbench.pipe import HEAD, Pipe, packed
+
+BY_HAND = "by hand"
+WRONG = (Problem, Broken, ImageError, ValueError, KeyError, TypeError)  # of whoever asks
+
+
+class Engine:
+    """A cell that is served with its past. Close it, or use it as a context manager."""
+
+    def __init__(self, end: socket.socket, order: Order) -> None:
+        """Build the cell and open its endpoints. Raises Problem, ImagesUnusable, EndpointError, ValueError."""
+        self._order = order
+        self._wall: WallNs = 0  # of the last look
+        self._before: Ns = 0  # the cell's time then
+        self._faster = 0.0
+        self._lateness = Lateness(0, 0, 0)
+        self._quiet = False  # nothing has changed since it was last told
+        self._cleanup = contextlib.ExitStack()
+        with contextlib.ExitStack() as opening:
+            found = self._find()
+            self._images = self._open_images(found.description)
+            if self._images is not None:
+                opening.callback(self._images.close)
+            cell = self._begin(found)
+            self._opened = open_endpoints(found.description, cell, order.wanted, opening)
+            self._pipe = Pipe(end, self._heed, self._tick, lambda: self._loop.stop())
+            opening.callback(self._pipe.close)
+            self._pace = Pace(order.pace or 1, origin=0)
+            self._set_pace(order.pace)
+            endpoints: list[tuple[int, Endpoint]] = [(0, self._pipe), *self._opened]  # what is asked comes first
+            patience = [line.format.duration(BEHIND) for line in cell.lines]
+            self._loop = Loop(self, self._pace, endpoints, patience=patience)
+            opening.callback(self._loop.close)
+            self._again()
+            if order.held or order.deeds:
+                self.hold()
+            self._cleanup = opening.pop_all()
+        self._tell_all()
+
+    # -- made anew ---------------------------------------------------------------------------------------
+
+    def _find(self) -> Target:
+        return target(self._order.target, straps=self._order.straps, options=self._order.options)
+
+    def _open_images(self, description: Description) -> Images | None:
+        folder = self._order.state_dir
+        if folder is None:
+            return None
+        return Images(folder, cell_name(self._order.target, is_file=bool(description.file)), models(description))
+
+    def _begin(self, found: Target) -> Cell:
+        """A new cell, with nothing behind it."""
+        self._found, self._reports = found, list[str]()
+        self._stores = Stores(self._images.save) if self._images is not None else Stores()
+        serial = any(wanted.kind == "serial" for wanted in self._order.wanted)  # the wire outside takes the time
+        line_timing = self._order.line_timing and not serial
+        cell = build_with_images(
+            found.description, found.read, self._images, line_timing, self._reports, True, self._stores.save
+        )
+        shafts = {name: unit.shaft for name, unit in found.description.units.items()}
+        self.history = History(cell, self._stores, shafts=shafts, on_stop=self._stopped)
+        self.history.on_notable = self._mark_entry
+        for part in self.history.motors:
+            rotors.prepare(cell, part)
+        self._views = views(cell, shafts)
+        self._marks: list[Mark] = []
+        self._told_marks: tuple[Mark, ...] = ()
+        self._shown: set[int] = set()  # motors of which something was told
+        return cell
+
+    def _again(self) -> None:
+        """What an engine before this one has done is done again."""
+        for action in self._order.deeds:
+            self.history.run_to(action.at)
+            with contextlib.suppress(*WRONG):  # as it was then
+                self.history.do(action.deed)
+        self.history.run_to(self._order.until)
+
+    def _picture(self) -> Picture:
+        description = self._found.description
+        return look.picture(description, self._order.target, self.history.cell, self._opened, self._reports)
+
+    def _tell_all(self) -> None:
+        description, read = self._found.description, self._found.read
+        self._pipe.push(Opened(self._picture(), look.sources(description, read), self._views))
+        self._tell()
+
+    # -- as it is served ---------------------------------------------------------------------------------
+
+    @property
+    def now(self) -> Ns:
+        """The cell's time."""
+        return self.history.now
+
+    @property
+    def lines(self) -> Sequence[ServedLine]:
+        """The lines."""
+        return self.history.lines
+
+    def next_event(self) -> Ns | None:
+        """When something happens next by itself."""
+        return self.history.next_event()
+
+    def run_to(self, until: Ns) -> None:
+        """Let everything happen up to and including `until`."""
+        self.history.run_to(until)
+
+    def send(self, line: int, data: Chars) -> None:
+        """The host of a line sends `data`, now."""
+        self.history.send(line, data)
+        self._quiet = False
+
+    def run(self) -> None:
+        """Serve until the workbench leaves. Raises EndpointLost."""
+        wake_exactly()
+        gc.freeze()  # what is there now stays: no collection shall look at it while a deadline waits
+        self._pace.restart(self.now)
+        with stopped_by_signals(self._loop):
+            self._loop.run()
+
+    def __enter__(self) -> "Engine":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._cleanup.close()
+
+    # -- what is told ------------------------------------------------------------------------------------
+
+    def _heed(self, message: object) -> None:
+        assert isinstance(message, Ask)
+        try:
+            value, error = self._VERBS[message.verb](self, *message.arguments), None
+        except WRONG as wrong:
+            value, error = None, str(wrong.args[0]) if isinstance(wrong, KeyError) and wrong.args else str(wrong)
+        self._tell()
+        self._pipe.push(Answer(message.number, value, error))
+
+    def _tick(self, wall: WallNs) -> None:
+        now, passed = self.now, wall - self._wall
+        if passed >= SECOND:
+            self._faster = max(now - self._before, 0) / passed if self._wall else 0.0
+            self._wall, self._before = wall, now
+            late = self._pace.lateness.summary()
+            self._lateness = Lateness(late.p50, late.p99, late.most)
+        if not self._pipe.full and not (self._quiet and self._pace.held):
+            self._tell()
+
+    def _tell(self) -> None:
+        """Everything that is new, and a look at the cell."""
+        history, found = self.history, {}
+        if not history.past:
+            for part in history.motors:
+                rows = rotors.rows(history.cell, part, history.now, first=part not in self._shown)
+                self._shown.add(part)
+                if len(rows):
+                    found[history.cell.wiring.names[part]] = rows
+        news = history.news()
+        if news.cut is not None:
+            at = news.cut.at
+            self._marks = [mark for mark in self._marks if mark.at <= at]
+            self._pipe.push(news.cut)
+        if news.batches or news.deeds or found:
+            self._pipe.push(Happened(news.first, news.batches, news.deeds, found, history.first_batch))
+        begin = history.begin
+        marks = tuple(mark for mark in self._marks if mark.at >= begin)[-MOST_MARKS:]
+        if marks != self._told_marks:
+            self._marks, self._told_marks = list(marks), marks
+            self._pipe.push(Marked(marks))
+        self._pipe.push(self._state())
+        self._quiet = True
+
+    def _state(self) -> State:
+        history, pace = self.history, self._pace
+        names = history.cell.wiring.names
+        stops: dict[str, set[int]] = {}
+        for unit, address in history.breakpoints:
+            stops.setdefault(names[unit], set()).add(address)
+        return State(
+            now=history.now,
+            begin=history.begin,
+            end=history.end,
+            pace=None if pace.free else float(pace.factor),
+            held=pace.held,
+            stopped_why=history.stopped,
+            lateness=self._lateness,
+            units=look.units(history),
+            switches=look.switches(history),
+            motors=look.motors(history),
+            breakpoints={name: frozenset(addresses) for name, addresses in stops.items()},
+            break_on_errors=history.break_on_errors,
+            marks=(),
+            formats={name: str(line.format) for name, line in self._named_lines()},
+            dropped=sum(endpoint.dropped for _, endpoint in self._opened),
+            faster=self._faster,
+        )
+
+    def _named_lines(self) -> list[tuple[str, Line]]:
+        cell = self.history.cell
+        return list(zip(cell.wiring.line_names, cell.lines, strict=True))
+
+    def _mark_entry(self, unit: int, entry: Entry) -> None:
+        name = self.history.cell.wiring.names[unit]
+        if isinstance(entry, Refused):
+            self._marks.append(Mark(entry.at, "error", name, f"{entry.frame}: {entry.reason}"))
+        elif isinstance(entry, Powered) and entry.at:
+            self._marks.append(Mark(entry.at, "power", name, "on" if entry.on else "off"))
+        elif isinstance(entry, StoreImage):
+            self._marks.append(Mark(entry.at, "stored", name, f"{len(entry.image)} bytes kept"))
+
+    def _stopped(self) -> None:
+        """The cell stands: so does the clock."""
+        why = self.history.stopped
+        if why != BY_HAND:
+            self._marks.append(Mark(self.now, "breakpoint", "", why))
+        self._pace.hold(self.now)
+        self._quiet = False
+
+    # -- verbs: time -------------------------------------------------------------------------------------
+
+    def hold(self) -> None:
+        """The cell stands."""
+        self.history.stop(BY_HAND)
+
+    def go(self) -> None:
+        """It goes on."""
+        self.history.go()
+        self._pace.go(self.now)
+
+    def _set_pace(self, factor: float | None) -> None:
+        self._pace.change(factor, self.now)
+        self._pace.lateness = Counted()
+
+    def step_event(self) -> None:
+        """The next event."""
+        self._stand()
+        if not self.history.step():
+            self.history.stopped = "nothing more happens by itself"
+
+    def step_instruction(self, unit: str) -> None:
+        """The next instruction of a unit."""
+        index = self.history.cell.unit(unit)
+        self._stand()
+        why = self.history.step_instruction(index)
+        if why:
+            self.history.stopped = f"{unit}: {why}"
+
+    def step_back(self, unit: str | None) -> None:
+        """The event, or instruction, before."""
+        index = None if unit is None else self.history.cell.unit(unit)
+        self._stand()
+        if not self.history.step_back(index):
+            self.history.stopped = "the beginning of what is kept"
+
+    def rewind(self, at: Ns) -> None:
+        """The cell as it was."""
+        self._stand()
+        self.history.rewind(at)
+
+    def _stand(self) -> None:
+        """The cell stands, by hand."""
+        self.hold()
+        self.history.stopped = BY_HAND
+        self._quiet = False
+
+    def run_to_address(self, unit: str, address: int) -> None:
+        """Go on, and stop there."""
+        once = self.history.cell.unit(unit), address
+        self.go()
+        self.history.once = once
+
+    def set_breakpoints(self, unit: str, addresses: Sequence[int]) -> None:
+        """The addresses of a unit at which it stops."""
+        index = self.history.cell.unit(unit)
+        others = {place for place in self.history.breakpoints if place[0] != index}
+        self.history.breakpoints = others | {(index, address) for address in addresses}
+
+    def set_break_on_errors(self, on: bool) -> None:
+        """Whether it stops at errors."""
+        self.history.break_on_errors = on
+
+    # -- verbs: deeds ------------------------------------------------------------------------------------
+
+    def power(self, unit: str, on: bool) -> None:
+        """Switch a supply; it is marked when it happens."""
+        self._do(Power(unit, on))
+
+    def set_switch(self, name: str, level: Level) -> None:
+        """Put a switch to a level."""
+        if name not in self.history.cell.wiring.names[self.history.cell.wiring.units :]:
+            raise catalogue.unknown("switch", name, tuple(look.switches(self.history)))
+        self._do(SetSwitch(name, level), "", f"{name} to {level}")
+
+    def set_pin(self, unit: str, pin: str, level: Level | None) -> None:
+        """Hold a wire to an input, or take it away."""
+        known = {p.name: p for p in self.history.cell.parts[self.history.cell.unit(unit)].pins if p.kind.reads}
+        if pin not in known:
+            raise catalogue.unknown(f"input of {unit}", pin, tuple(known))
+        if level is None:
+            self._do(Release(unit, pin), unit, f"{pin} released")
+        else:
+            self._do(SetPin(unit, pin, level), unit, f"{pin} to {level}")
+
+    def place_switch(self, name: str, low: float | None, high: float | None) -> None:
+        """Put a switch elsewhere on its axis."""
+        ends = " to ".join("..." if place is None else f"{place:g}" for place in (low, high))
+        self._do(PlaceSwitch(name, low, high), "", f"{name} at {ends}")
+
+    def send_line(self, line: str, data: bytes) -> None:
+        """The host of a line sends."""
+        names = self.history.cell.wiring.line_names
+        if line not in names:
+            raise catalogue.unknown("line", line, names)
+        self._do(Send(names.index(line), data))
+
+    def type(self, unit: str, text: str) -> None:
+        """The host of a unit sends it a command line."""
+        self._do(Type(unit, text))
+
+    def load(self, unit: str, image: bytes, base: int) -> None:
+        """Put a program into memory."""
+        self._do(Load(unit, image, base), unit, f"{len(image)} bytes loaded")
+
+    def start(self, unit: str) -> None:
+        """Start the program in memory."""
+        self._do(Start(unit), unit, "started")
+
+    def save(self, unit: str) -> int:
+        """Send the unit its own command that keeps its program; how often it had written before."""
+        index = self.history.cell.unit(unit)
+        command = catalogue.model(self.history.cell.controller(unit).model).saves
+        if not command:
+            raise ValueError(f"{unit} has no memory that lasts without supply")
+        written = self.history.panel.fronts[index].stored
+        self._do(Type(unit, command))
+        return written
+
+    def read_back(self, unit: str, kept: bool) -> bytes:
+        """What is in memory."""
+        controller = self.history.cell.controller(unit)
+        return controller.kept_memory() if kept else controller.program_memory()
+
+    def restart(self) -> None:
+        """Begin anew from the cell file. ValueError if its lines are others now."""
+        lines, standing = self.history.cell.wiring.line_names, self._pace.held
+        found, before = self._find(), (self._found, self._stores, self.history, self._reports, self._views, self._marks)
+        stops = {(self.history.cell.wiring.names[unit], address) for unit, address in self.history.breakpoints}
+        cell = self._begin(found)
+        if cell.wiring.line_names != lines:
+            self._found, self._stores, self.history, self._reports, self._views, self._marks = before
+            raise ValueError("the lines of the cell are others now: close the workbench and open it again")
+        units = cell.wiring.names[: cell.wiring.units]
+        self.history.breakpoints = {(units.index(unit), address) for unit, address in stops if unit in units}
+        self._pace.go(self.now)
+        if standing:
+            self.hold()
+        self._tell_all()
+
+    def _do(self, deed: Deed, unit: str = "", text: str = "") -> None:
+        self.history.do(deed)
+        self._quiet = False
+        if text:
+            self._marks.append(Mark(self.now, "deed", unit, text))
+        if self._pace.held:
+            self._pace.hold(self.now)
+
+    def fail(self, error: Exception) -> None:
+        """Tell the workbench why there is an end."""
+        trace = "".join(traceback.format_exception(error))
+        self._pipe.push(Failed(f"{type(error).__name__}: {error}", trace, asked_wrongly=False))
+
+    _VERBS: ClassVar[dict[str, Callable[..., object]]] = {
+        verb.__name__: verb
+        for verb in (hold, go, step_event, step_instruction, step_back, rewind, run_to_address, set_breakpoints,
+                     set_break_on_errors, power, set_switch, set_pin, place_switch, send_line, type, load, start, save,
+                     read_back, restart)
+    } | {"pace": _set_pace}  # fmt: skip
+
+
+def _read_order(end: socket.socket) -> Order | None:
+    """The first message; None if there is none."""
+    head = end.recv(HEAD.size, socket.MSG_WAITALL)
+    if len(head) < HEAD.size:
+        return None
+    (length,) = HEAD.unpack(head)
+    order = pickle.loads(end.recv(length, socket.MSG_WAITALL))  # of the process that made us
+    return order if isinstance(order, Order) else None
+
+
+def main(descriptor: int) -> int:
+    """Open what the first message on the pipe orders, and serve it until the pipe ends."""
+    end = socket.socket(fileno=descriptor)
+    order = _read_order(end)
+    if order is None:
+        return 0
+    try:
+        with Engine(end, order) as engine:
+            try:
+                engine.run()
+            except Exception as error:
+                engine.fail(error)
+                return 1
+    except (Problem, ImagesUnusable, EndpointError, ValueError) as error:
+        end.setblocking(True)
+        end.sendall(packed(Failed(str(error), "", asked_wrongly=True)))
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1])))

@@ -1,0 +1,116 @@
+"""A script for a line: command lines that are sent one after the other, with pauses in the time of the cell.
+
+One command a line, as it is typed; ``;`` begins a comment. ``@ 500 ms`` (or ``@ 0.5``, in seconds) is a pause, and
+``@ answer`` waits until somebody has answered on the line since the last command.
+"""
+
+import asyncio
+from typing import TYPE_CHECKING, NamedTuple
+
+from detent.ticks import Ns, parse_duration
+from detent.workbench.live import Live, Value
+
+if TYPE_CHECKING:
+    from detent.workbench.client import Bench
+
+MOST_LINES = 10_000
+
+
+class Pause(NamedTuple):
+    """Wait so long in the time of the cell."""
+
+    line: int
+    length: Ns
+
+
+class Answered(NamedTuple):
+    """Wait for an answer."""
+
+    line: int
+
+
+class Command(NamedTuple):
+    """Send a command line."""
+
+    line: int
+    text: str
+
+
+Step = Pause | Answered | Command
+
+
+def parse(text: str, comment: str = ";") -> list[Step]:
+    """The steps of a script, each with its line from 1. Raises ValueError with the line and the remedy."""
+    steps: list[Step] = []
+    for number, written in enumerate(text.splitlines(), 1):
+        line = written.partition(comment)[0].strip() if comment else written.strip()
+        if not line:
+            continue
+        if not line.startswith("@"):
+            steps.append(Command(number, line))
+        elif line[1:].strip().lower() == "answer":
+            steps.append(Answered(number))
+        else:
+            try:
+                steps.append(Pause(number, parse_duration(line[1:].strip())))
+            except ValueError:
+                what = f"line {number}: {line!r} is no pause; write @ 500 ms, @ 0.5 (seconds) or @ answer"
+                raise ValueError(what) from None
+    if len(steps) > MOST_LINES:
+        raise ValueError(f"{len(steps)} lines are too many; at most {MOST_LINES}")
+    return steps
+
+
+class Errands:
+    """Runs one script at a time on each line of a bench, and shows in `live` (``script.LINE``) how far it is."""
+
+    def __init__(self, bench: "Bench", live: Live) -> None:
+        self._bench, self._live = bench, live
+        self._running: dict[str, asyncio.Task[None]] = {}
+
+    def start(self, line: str, unit: str, text: str) -> None:
+        """Run the script `text` on a line, its commands to `unit`. Raises ValueError, KeyError."""
+        steps = parse(text)
+        if not steps:
+            raise ValueError("there is nothing to send; write one command a line")
+        units = self._bench.picture.lines[line].units
+        if unit not in units:
+            raise ValueError(f"{unit} is not on line {line}; there are: {', '.join(units)}")
+        self.stop(line)
+        self._running[line] = asyncio.create_task(self._run(line, unit, steps))
+
+    def stop(self, line: str) -> None:
+        """End the script that runs on a line, if one does."""
+        task = self._running.pop(line, None)
+        if task is not None:
+            task.cancel()
+            self._tell(line, {"running": False, "line": 0, "told": "stopped"})
+
+    async def _run(self, line: str, unit: str, steps: list[Step]) -> None:
+        told = "done"
+        at = 0
+        try:
+            heard = self._heard(line)
+            for step in steps:
+                at = step.line
+                self._tell(line, {"running": True, "line": at, "told": ""})
+                match step:
+                    case Command():
+                        heard = self._heard(line)
+                        await self._bench.type(unit, step.text)
+                    case Pause():
+                        until = self._bench.state.now + step.length
+                        await self._bench.until(lambda state, until=until: state.now >= until)  # type: ignore[misc]
+                    case Answered():
+                        await self._bench.until(lambda state, heard=heard: self._heard(line) > heard)  # type: ignore[misc]
+        except (ValueError, RuntimeError) as error:
+            told = f"line {at}: {error}"
+        self._running.pop(line, None)
+        self._tell(line, {"running": False, "line": at if told != "done" else 0, "told": told})
+
+    def _heard(self, line: str) -> int:
+        """How many whole rows of answers there are."""
+        return sum(1 for row in self._bench.terminal(line).rows if row.whole and row.sender)
+
+    def _tell(self, line: str, how: dict[str, Value]) -> None:
+        self._live.put({f"script.{line}": how})

@@ -1,0 +1,253 @@
+"""The page Cell: every unit as a front panel, the panel switches, motors and axes, and the wires between them."""
+
+import json
+from collections.abc import Iterable
+from html import escape
+from typing import TYPE_CHECKING
+
+from nicegui import ui
+
+from detent.workbench.icons import icon
+from detent.workbench.messages import LinePicture, MotorPicture, Picture, PinPicture, SwitchPicture, UnitPicture
+from detent.workbench.pages import Page, Window
+
+if TYPE_CHECKING:
+    from detent.workbench.client import Bench
+
+TURN = 200  # steps of a turn of the dial where no motor is fitted that would say
+
+DRIVES = ("output", "open collector", "winding")
+
+
+def build(bench: "Bench", window: Window) -> None:
+    """The cell as it is now; it is built anew when there is another picture of it."""
+
+    @ui.refreshable
+    def drawing() -> None:
+        ui.html(markup(bench.picture), sanitize=False)
+
+    seen = bench.picture
+
+    def look() -> None:
+        nonlocal seen
+        if bench.picture is not seen:
+            seen = bench.picture
+            drawing.refresh()
+
+    drawing()
+    window.each_state(look)
+
+
+def markup(picture: Picture) -> str:
+    """The whole cell as HTML bound to the live table."""
+    jacks = {end for wire in picture.wires for end in (wire.source, *wire.targets)}
+    panel = [switch for switch in picture.switches.values() if switch.axis is None]
+    loose = [motor for motor in picture.motors.values() if motor.unit is None]
+    cards = "".join(_unit(picture, unit, jacks) for unit in picture.units.values())
+    cards += "".join(_loose_motor(picture, motor, jacks) for motor in loose)
+    wires = json.dumps([[wire.source, list(wire.targets)] for wire in picture.wires])
+    return (
+        f'<div class="cell{" with-panel" if panel else ""}" data-part="wires" data-wires="{escape(wires)}">'
+        f'<svg class="wires" aria-hidden="true"></svg>{_panel(panel) if panel else ""}'
+        f'<div class="units" style="--count:{max(1, len(picture.units) + len(loose))}">{cards}</div></div>'
+    )
+
+
+def _panel(switches: Iterable[SwitchPicture]) -> str:
+    """The switches that a hand sets."""
+    rows = "".join(
+        f"""<button class="toggle" role="switch" data-do="set_switch" data-args="{_args(s.name, f"!s.{s.name}.level")}"
+ data-pressed="s.{escape(s.name)}.level" data-jack="{escape(s.name)}" data-side="right"
+ data-help="Switch {escape(s.name)}: drives {escape(", ".join(s.drives))}">
+<span class="name">{escape(s.name)}</span><i class="lever" aria-hidden="true"></i>
+<b class="num" data-live="s.{escape(s.name)}.level" data-form="level"></b><i class="jack"></i></button>"""
+        for s in switches
+    )
+    return f"""<section class="panel panel-switches" aria-label="Switches">
+<div class="panel-head"><h2>Switches</h2></div>{rows}</section>"""
+
+
+def _unit(picture: Picture, unit: UnitPicture, jacks: set[str]) -> str:
+    """The front panel of a unit."""
+    name, key = escape(unit.name), escape(f"u.{unit.name}")
+    line = picture.lines.get(unit.line) if unit.line is not None else None
+    axes = "".join(_axis(picture, unit, axis, jacks) for axis in unit.axes)
+    return f"""<section class="unit panel" data-unit="{name}" data-level="{key}.powered" aria-label="Unit {name}">
+<div class="panel-head"><button class="power" role="switch" data-do="power" data-pressed="{key}.powered"
+ data-args="{_args(unit.name, f"!u.{unit.name}.powered")}" aria-label="Power of {name}"
+ data-help="Power of {name}">{icon("power")}</button>
+<h2>{name}</h2><span class="quiet model" data-help="{escape(unit.title)}">{escape(unit.model)}</span>
+<span class="state" data-live="{key}.state" data-level="{key}.state"></span></div>
+{axes}{_doing(unit)}{_pins(unit, jacks)}{_straps(unit)}{_foot(unit, line)}</section>"""
+
+
+def _doing(unit: UnitPicture) -> str:
+    """The instruction that the unit is at, and what it turned down last."""
+    name, key = escape(unit.name), escape(f"u.{unit.name}")
+    if not unit.axes:
+        return ""
+    row = f"""<div class="doing"><span class="quiet num" data-live="{key}.address"></span>
+<span class="num grow now" data-live="{key}.running"></span>
+<button class="key small" data-do="step_instruction" data-args="{_args(unit.name)}"
+ aria-label="One instruction of {name}" data-help="Run one instruction of {name}, then pause">{icon("step")}</button>
+<button class="key small" data-do="start" data-args="{_args(unit.name)}" aria-label="Start the program of {name}"
+ data-help="Start the program in memory">{icon("start")}</button></div>"""
+    fault = f"""<div class="fault" data-level="{key}.error"><i class="led"></i>
+<span class="grow" data-live="{key}.error"></span></div>"""
+    return (row if unit.language else "") + fault
+
+
+def _axis(picture: Picture, unit: UnitPicture, axis: str, jacks: set[str]) -> str:
+    """An axis: its readout, its dial and its slide with the switches on it."""
+    place = escape(f"u.{unit.name}.x.{axis}")
+    motor = next((m for m in picture.motors.values() if m.unit == unit.name and m.axis == axis), None)
+    named = f"{unit.name}.{axis}" if axis else unit.name
+    owners = (named,) if motor is None else (named, motor.name)
+    switches = [s for s in picture.switches.values() if s.axis in owners]
+    dial = _dial(f"u.{unit.name}.x.{axis}.shaft", TURN, None)
+    if motor is not None:
+        dial = _dial(f"m.{motor.name}.place", motor.steps, motor)
+    label = f'<span class="axis-name">{escape(axis)}</span>' if axis else ""
+    readout = f"""<div class="readout">{label}<span class="first"><output data-live="{place}.position" data-form="steps"
+ aria-label="Position of {escape(named)}" data-help="Position by the counter of the controller, in steps"></output>
+<small>steps</small></span><span class="second">
+<b data-live="{place}.rate" data-form="rate" data-help="Rate now"></b><small>steps/s</small>
+<b data-live="{place}.pulses" data-form="count" data-help="Step pulses given since the cell began"></b>
+<small>pulses</small></span>{_rotor(motor)}</div>"""
+    pins = _motor_pins(motor, jacks) if motor is not None else ""
+    return f'<div class="axis">{dial}{readout}</div>{_slide(unit.name, axis, motor, switches)}{pins}'
+
+
+def _dial(key: str, turn: float, motor: MotorPicture | None) -> str:
+    """A dial whose pointer turns once in `turn` steps."""
+    what = f"Rotor of {motor.name} ({motor.motor})" if motor is not None else "The shaft as the pulses command it"
+    ticks = "".join(
+        f'<line x1="0" y1="-44" x2="0" y2="{-38 if n % 5 else -35}" transform="rotate({n * 18})"/>' for n in range(20)
+    )
+    command = '<g class="command"><line x1="0" y1="-20" x2="0" y2="-40"/></g>' if motor is not None else ""
+    bound = f' data-command="m.{escape(motor.name)}.command"' if motor is not None else ""
+    return f"""<svg class="dial" viewBox="-50 -50 100 100" data-part="dial" data-key="{escape(key)}"
+ data-turn="{turn:g}"{bound} data-help="{escape(what)}: one turn is {turn:g} steps" role="img"
+ aria-label="{escape(what)}"><circle class="face" r="47"/><g class="ticks">{ticks}</g>{command}
+<g class="pointer"><path d="M-3.5 9L-1.5-34h3L3.5 9z"/><circle r="6"/></g></svg>"""
+
+
+def _rotor(motor: MotorPicture | None) -> str:
+    """Where the rotor is, beside what it was commanded."""
+    if motor is None:
+        return ""
+    key = escape(f"m.{motor.name}")
+    return f"""<span class="rotor" data-level="{key}.lost"><small>rotor</small>
+<b data-live="{key}.place" data-form="fixed"></b><b data-live="{key}.speed" data-form="rate"></b><small>steps/s</small>
+<small class="lost">lost <span data-live="{key}.lost"></span></small></span>"""
+
+
+def _slide(unit: str, axis: str, motor: MotorPicture | None, switches: Iterable[SwitchPicture]) -> str:
+    """The axis as a slide. Its script draws the scale and lets the switches be dragged."""
+    facts = {
+        "key": f"m.{motor.name}.place" if motor is not None else f"u.{unit}.x.{axis}.shaft",
+        "lead": motor.lead if motor is not None and motor.lead is not None else 1,
+        "whole": motor is None,
+        "switches": [s.name for s in switches],
+    }
+    contacts = "".join(
+        f"""<div class="contact" data-jack="{escape(s.name)}" data-side="left" data-level="s.{escape(s.name)}.level"
+ data-help="Switch {escape(s.name)} on the axis: drives {escape(", ".join(s.drives))}">
+<i class="jack"></i><i class="led"></i><span class="name">{escape(s.name)}</span>
+<span class="quiet num places" data-places="{escape(s.name)}"></span></div>"""
+        for s in switches
+    )
+    return f'<div class="slide" data-part="slide" data-facts="{escape(json.dumps(facts))}"></div>{contacts}'
+
+
+def _motor_pins(motor: MotorPicture, jacks: set[str]) -> str:
+    """The pins of a motor to which wires lead. Their levels are those of the other end."""
+    return "".join(
+        f"""<div class="contact" data-jack="{escape(end)}" data-side="left"><i class="jack"></i>
+<span class="name">{escape(motor.name)}</span><span class="num">{escape(end.partition(".")[2])}</span></div>"""
+        for end in sorted(jack for jack in jacks if jack.startswith(f"{motor.name}."))
+    )
+
+
+def _pins(unit: UnitPicture, jacks: set[str]) -> str:
+    """Inputs on the left, outputs on the right, each with its jack at the edge; free inputs fill up the right."""
+    inputs = [pin for pin in unit.pins if pin.kind == "input"]
+    outputs = [pin for pin in unit.pins if pin.kind in DRIVES and (pin.kind != "winding" or pin.wired)]
+    free = [pin for pin in inputs if f"{unit.name}.{pin.name}" not in jacks]
+    moved = free[len(free) - max(0, min(len(free), (len(inputs) - len(outputs)) // 2)) :]
+    kept = [pin for pin in inputs if pin not in moved]
+    if not inputs and not outputs:
+        return ""
+    left = "".join(_pin(unit, pin, "left", f"{unit.name}.{pin.name}" in jacks) for pin in kept)
+    right = "".join(_pin(unit, pin, "right", f"{unit.name}.{pin.name}" in jacks) for pin in (*outputs, *moved))
+    registers = f'<dl class="registers" data-part="registers" data-key="u.{escape(unit.name)}.reg"></dl>'
+    return f"""<div class="pins"><div class="side">{left}</div><div class="side">{right}</div>
+{registers if unit.axes else ""}</div>"""
+
+
+def _pin(unit: UnitPicture, pin: PinPicture, side: str, wired: bool) -> str:
+    """A pin: its jack, its lamp, its level, its name. An input can be clicked."""
+    end, key = escape(f"{unit.name}.{pin.name}"), escape(f"u.{unit.name}.pin.{pin.name}")
+    number = f"pin {pin.number}, " if pin.number is not None else ""
+    told = escape(f"{pin.name} ({number}{pin.kind}): {pin.help}")
+    inner = f"""<i class="jack"></i><i class="led"></i><b class="num" data-live="{key}" data-form="level"></b>
+<span class="name">{escape(pin.name)}</span>"""
+    shared = (
+        f"""class="pin {side}{" wired" if wired else ""}" data-level="{key}" data-side="{side}" data-jack="{end}\""""
+    )
+    if pin.kind != "input":
+        return f'<div {shared} data-help="{told}" tabindex="0">{inner}</div>'
+    return f"""<button {shared} data-part="input-pin" data-unit="{escape(unit.name)}" data-pin="{escape(pin.name)}"
+ data-help="{told}. Click: hold a wire of the other level to it; click again: take it away.">{inner}</button>"""
+
+
+def _straps(unit: UnitPicture) -> str:
+    """The straps as a block of small switches."""
+    keys = "".join(
+        f"""<button class="strap" role="switch" data-do="set_strap"
+ data-pressed="u.{escape(f"{unit.name}.pin.{pin.name}")}"
+ data-args="{_args(unit.name, pin.name, f"!u.{unit.name}.pin.{pin.name}")}"
+ aria-label="Strap {escape(pin.name)} of {escape(unit.name)}"
+ data-help="{escape(f"{pin.name}: {pin.help}. Read at the next power-on.")}">
+<i aria-hidden="true"></i><span>{escape(pin.name)}</span></button>"""
+        for pin in unit.pins
+        if pin.name in unit.straps
+    )
+    return f'<div class="straps" role="group" aria-label="Straps of {escape(unit.name)}">{keys}</div>' if keys else ""
+
+
+def _foot(unit: UnitPicture, line: LinePicture | None) -> str:
+    """A command line to the unit, and where a host finds it."""
+    if line is None:
+        return ""
+    name = escape(unit.name)
+    ends = "".join(
+        f"""<button type="button" class="endpoint num" data-part="copy" data-copy="{escape(one.address)}"
+ data-help="Where a host program connects to line {escape(line.name)}: click to copy">{escape(one.address)}</button>"""
+        for one in line.endpoints
+    )
+    return f"""<form class="foot" data-part="command" data-unit="{name}">
+<input class="field mono grow" aria-label="Command to {name}" placeholder="Command to {name}" spellcheck="false"
+ autocomplete="off" autocapitalize="off">
+<button class="key" aria-label="Send to {name}">{icon("send")}</button>
+<span class="quiet where"><span data-live="l.{escape(line.name)}.format">{escape(line.format)}</span>
+{ends}</span></form>"""
+
+
+def _loose_motor(picture: Picture, motor: MotorPicture, jacks: set[str]) -> str:
+    """A motor whose steps a wire brings."""
+    name = escape(motor.name)
+    switches = [s for s in picture.switches.values() if s.axis == motor.name]
+    return f"""<section class="unit panel" aria-label="Motor {name}" data-value="true">
+<div class="panel-head"><h2>{name}</h2><span class="quiet model">{escape(motor.motor)}</span></div>
+<div class="axis">{_dial(f"m.{motor.name}.place", motor.steps, motor)}<div class="readout">
+<span class="first"><output data-live="m.{name}.command" data-form="steps"></output>
+<small>steps</small></span>{_rotor(motor)}</div></div>
+{_slide("", "", motor, switches)}{_motor_pins(motor, jacks)}</section>"""
+
+
+def _args(*values: object) -> str:
+    return escape(json.dumps(values))
+
+
+PAGE = Page("Cell", "/", "cell", build, scripts=("wires.js", "cell.js"), styles=("cell.css",))

@@ -1,0 +1,123 @@
+"""The web server of the workbench: one bench, its pages, and nothing that is loaded from elsewhere."""
+
+import asyncio
+import contextlib
+import hashlib
+import signal
+import socket
+from collections.abc import Callable, Iterator, Mapping
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import nicegui
+import uvicorn
+from fastapi import FastAPI, WebSocket
+from fastapi.staticfiles import StaticFiles
+from nicegui import ui
+
+import detent
+from detent.workbench import filing, shell
+from detent.workbench.board import Board
+from detent.workbench.drafts import Drafts
+from detent.workbench.folder import Folder
+from detent.workbench.guard import Guard, names_of_this_machine
+from detent.workbench.listening import Listening, Place
+from detent.workbench.live import Live
+from detent.workbench.pages import Page, Window, cell, motion, program, scope, terminal
+
+if TYPE_CHECKING:
+    from detent.workbench.client import Bench
+
+PAGES: tuple[Page, ...] = (cell.PAGE, program.PAGE, terminal.PAGE, scope.PAGE, motion.PAGE)
+"""The pages in the order of their tabs."""
+
+PATIENCE = 2  # s that open windows are given when the server ends
+
+
+def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place) -> Guard:
+    """The pages of `bench` behind their guard, an ASGI application. Once in a process: NiceGUI has but one.
+
+    Raises ValueError for an address that needs a token.
+    """
+    live = Live()
+    site = FastAPI(title="Detent", docs_url=None, redoc_url=None, openapi_url=None)
+    guard = Guard(site, place.host, place.token, names_of_this_machine())
+    Board(bench, live)
+    filing.offer(live, folder, drafts)
+
+    async def live_socket(socket: WebSocket) -> None:
+        await live.serve(socket)
+
+    site.add_api_websocket_route("/live", live_socket)
+    with as_file(files("detent.workbench") / "assets") as assets:
+        site.mount("/assets", StaticFiles(directory=assets))
+        version = _version(assets)
+    for page in PAGES:
+        if page.offer is not None:
+            page.offer(site, bench, live)
+    ui.add_head_html(shell.head(PAGES, version), shared=True)
+
+    def root() -> None:
+        window = Window(bench)
+        ui.context.client.on_delete(window.leave)
+        shell.build(window, PAGES)
+
+    icon = "data:image/svg+xml;utf8," + shell.FAVICON
+    ui.run_with(site, root=root, title="Detent", favicon=icon, dark=None, tailwind=False, show_welcome_message=False,
+                reconnect_timeout=20, binding_refresh_interval=None, language="en-US")  # fmt: skip
+    return guard
+
+
+async def serve(application: Guard, listening: Listening, ready: Callable[[], None]) -> None:
+    """Serve until SIGINT, SIGTERM or SIGHUP. `ready` is called once a browser may come."""
+    config = uvicorn.Config(
+        application, log_level="warning", lifespan="on", ws="wsproto", ws_per_message_deflate=False,
+        timeout_graceful_shutdown=PATIENCE, access_log=False, server_header=False, ws_max_size=4 << 20,
+    )  # fmt: skip
+    server = _Server(config)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        loop.add_signal_handler(number, server.end)
+    serving = asyncio.create_task(server.serve(sockets=[listening.socket]))
+    telling = asyncio.create_task(server.told_started(ready))
+    try:
+        await serving
+    finally:
+        telling.cancel()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            loop.remove_signal_handler(number)
+
+
+class _Server(uvicorn.Server):
+    """A server that leaves signals to us and says when it has started."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._up = asyncio.Event()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        self._up.set()
+
+    async def told_started(self, ready: Callable[[], None]) -> None:
+        """Call `ready` once the server has started."""
+        await self._up.wait()
+        ready()
+
+    def end(self) -> None:
+        """End soon: open windows get `PATIENCE`."""
+        self.should_exit = True
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+def _version(assets: Path) -> str:
+    """Some digits that change when an asset or NiceGUI does, so that browsers may keep what they have."""
+    digest = hashlib.sha256(f"{detent.__version__} {nicegui.__version__}".encode())
+    contents: Mapping[str, bytes] = {path.name: path.read_bytes() for path in sorted(assets.iterdir())}
+    for name, data in contents.items():
+        digest.update(name.encode() + data)
+    return digest.hexdigest()[:10]

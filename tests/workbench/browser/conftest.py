@@ -1,0 +1,84 @@
+"""A real browser at a real workbench: `detent workbench` as a process, Debian's Chromium driven by Playwright.
+
+One workbench serves all tests (`workbench`); each test gets the cell begun anew and a window of its own (`window`),
+which fails the test if a page asked another host for anything or raised an error. With DETENT_PICTURES set, pictures
+are written to that folder.
+"""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.workbench.browser.windows import Served, Window, Windows, begun, served
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytest.importorskip("nicegui", reason="nicegui is not installed")
+
+CHROMIUM = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+GROUP = pytest.mark.xdist_group("browser")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """All of them in one worker: they share the workbench and the browser."""
+    here = str(Path(__file__).parent)
+    for item in items:
+        if str(item.path).startswith(here):
+            item.add_marker(GROUP)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """The browser. While it is open this thread counts as one with an event loop: other modules need it without."""
+    if CHROMIUM is None:
+        pytest.skip("no chromium on this machine")
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Served]]:
+    """Start a workbench with other arguments (a cell file, options); it serves until all tests are done."""
+    with ExitStack() as stack:
+        running: dict[tuple[str, ...], Served] = {}
+
+        def start(*arguments: str) -> Served:
+            if arguments not in running:
+                place = tmp_path_factory.mktemp("workbench")
+                running[arguments] = stack.enter_context(served(place, *arguments))
+            return running[arguments]
+
+        yield start
+
+
+@pytest.fixture
+def workbench(chromium: Any, serve: Callable[..., Served]) -> Served:
+    """The workbench as it opens without a word: the drilling cell, running."""
+    return serve()
+
+
+@pytest.fixture(scope="module")
+def profiles() -> dict[object, Any]:
+    """The profiles of the browser that windows share."""
+    return {}
+
+
+@pytest.fixture
+def windows(chromium: Any, profiles: dict[object, Any]) -> Iterator[Windows]:
+    """Windows of this test; at its end none of them may have asked another host, or raised an error."""
+    opened = Windows(chromium, profiles)
+    yield opened
+    found = opened.close()
+    assert found == [([], [])] * len(found)
+
+
+@pytest.fixture
+def window(windows: Windows, workbench: Served) -> Window:
+    """A window at the page Cell, the cell begun anew and running in real time."""
+    return begun(windows.usual(workbench))

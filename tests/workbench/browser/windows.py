@@ -1,0 +1,172 @@
+"""A workbench as a process, and windows of a browser at it: what the tests here share."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+COMMAND = [sys.executable, "-c", "from detent.cli import main; main()", "workbench"]
+WIDE, PHONE = (1280, 800), (390, 844)
+THEMES = ("light", "dark")
+PICTURES = os.environ.get("DETENT_PICTURES")
+EVERY_LOOK = [(size, theme) for size in (WIDE, PHONE) for theme in THEMES]
+LOOKS = EVERY_LOOK if PICTURES else [(WIDE, "light"), (PHONE, "dark")]
+"""Windows in which every page is looked at: all of them when pictures are wanted."""
+
+
+class Served(NamedTuple):
+    """A workbench that serves."""
+
+    url: str
+    endpoints: list[dict[str, str]]
+    folder: Path  # the chosen one
+    state: Path
+    process: subprocess.Popen[str]
+
+
+@contextmanager
+def served(place: Path, *arguments: str) -> Iterator[Served]:
+    """`detent workbench ARGUMENTS`, its files below `place`."""
+    folder, state = place / "chosen", place / "state"
+    folder.mkdir(exist_ok=True)
+    command = [*COMMAND, *arguments, "--json", "--folder", str(folder), "--state", str(state)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=place)
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert line, process.communicate()[1]
+        facts = json.loads(line)
+        yield Served(facts["url"], facts["endpoints"], folder, state, process)
+    finally:
+        process.terminate()
+        try:
+            _, err = process.communicate(timeout=60)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            raise
+    assert process.returncode == 0, err
+    assert "Traceback" not in err, err
+
+
+class Window:
+    """A window of the browser: a Playwright page, with what tests of the workbench do often."""
+
+    def __init__(self, page: Any, url: str) -> None:
+        self.page, self.url = page, url
+        self.kept = False  # for the next test
+        self.process = 0  # the workbench, for who wants to know it
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
+        page.on("request", lambda request: self.requests.append(request.url))
+
+    def open(self, path: str = "/") -> "Window":
+        """Load a page and wait until it shows live values."""
+        self.page.goto(self.url.split("?")[0].rstrip("/") + path)
+        self.page.wait_for_function("window.detent && detent.get('now') !== undefined")
+        return self
+
+    def call(self, name: str, *arguments: object) -> Any:
+        """Make a call of the live socket (see `detent.workbench.board`)."""
+        return self.page.evaluate("([name, args]) => detent.call(name, ...args)", [name, list(arguments)])
+
+    def get(self, key: str) -> Any:
+        """A value of the live table."""
+        return self.page.evaluate("(key) => detent.get(key)", key)
+
+    def until(self, condition: str, argument: object = None) -> None:
+        """Wait until the JavaScript function `condition` is true; `detent.get(KEY)` tells values."""
+        self.page.wait_for_function(condition, arg=argument)
+
+    def click(self, name: str, role: str = "button") -> None:
+        """Click what has this name for a screen reader."""
+        self.page.get_by_role(role, name=name, exact=True).click()
+
+    def foreign(self) -> list[str]:
+        """Requests to other places than the workbench."""
+        own = self.url.split("/")[2]
+        return [
+            url
+            for url in self.requests
+            if url.split(":")[0] in ("http", "https", "ws", "wss") and url.split("/")[2] != own
+        ]
+
+    def picture(self, name: str) -> None:
+        """Write a picture of what is seen, if pictures are wanted."""
+        if PICTURES:
+            Path(PICTURES).mkdir(parents=True, exist_ok=True)
+            self.page.screenshot(path=str(Path(PICTURES) / f"{name}.png"))
+
+
+class Windows:
+    """Opens windows of one workbench, and looks at them when the test is over.
+
+    Windows of one size and theme share a profile of the browser, so that it loads what never changes once.
+    """
+
+    def __init__(self, chromium: Any, profiles: dict[object, Any]) -> None:
+        self._chromium, self._profiles = chromium, profiles
+        self.opened: list[Window] = []
+
+    def new(self, served: Served, *, size: tuple[int, int] = WIDE, theme: str = "light", tour: bool = False) -> Window:
+        """A window, not yet at a page."""
+        window = Window(self._profile(size, theme, tour).new_page(), served.url)
+        self.opened.append(window)
+        return window
+
+    def usual(self, served: Served) -> Window:
+        """The window that tests use one after the other, at the page where the last one left it."""
+        kept = ("usual", served.url)
+        if kept not in self._profiles:
+            self._profiles[kept] = Window(self._profile(WIDE, "light", False).new_page(), served.url)
+        window: Window = self._profiles[kept]
+        window.kept = True
+        self.opened.append(window)
+        return window
+
+    def close(self) -> list[tuple[list[str], list[str]]]:
+        """Close all of them but the usual one; what each asked of other hosts, and its errors."""
+        found = [(window.foreign(), list(window.errors)) for window in self.opened]
+        for window in self.opened:
+            if window.page.url.startswith("http"):
+                window.page.evaluate("localStorage.clear()")
+            if window.kept and not window.errors:
+                window.requests.clear()
+            else:
+                window.page.close()
+                self._profiles.pop(("usual", window.url), None)
+        return found
+
+    def _profile(self, size: tuple[int, int], theme: str, tour: bool) -> Any:
+        kind = (size, theme, tour)
+        if kind not in self._profiles:
+            phone = size[0] < 600
+            self._profiles[kind] = self._chromium.new_context(
+                viewport={"width": size[0], "height": size[1]}, color_scheme=theme, has_touch=phone, is_mobile=phone,
+                permissions=["clipboard-read", "clipboard-write"],
+            )  # fmt: skip
+            if not tour:
+                self._profiles[kind].add_init_script("localStorage.setItem('detent.tour', 'seen')")
+        return self._profiles[kind]
+
+
+def begun(window: Window) -> Window:
+    """The window at the page Cell, its cell begun anew and running in real time."""
+    if window.page.url == "about:blank":
+        window.open()
+    else:
+        window.page.get_by_role("link", name="Cell", exact=True).click()
+        window.page.locator(".cell").wait_for()
+    window.call("pace", 1)
+    window.call("break_on_errors", False)
+    window.call("restart")
+    window.until("() => detent.get('now') < 60e9 && !detent.get('past')")
+    if window.get("held"):
+        window.call("go")
+    window.until("() => !detent.get('held')")
+    return window

@@ -1,0 +1,99 @@
+"""Scripts for a line: what is sent when, and what is said about it."""
+
+import asyncio
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from detent.ticks import MS, SECOND
+from detent.workbench.errands import Answered, Command, Errands, Pause, parse
+from detent.workbench.live import Live
+
+
+def test_a_script_is_commands_pauses_and_waiting_for_answers() -> None:
+    text = "; two moves\n+200\n\n@ 500 ms ; rest\n@0.5\n  -200 ; back\n@ answer\n"
+    assert parse(text) == [
+        Command(2, "+200"), Pause(4, 500 * MS), Pause(5, SECOND // 2), Command(6, "-200"), Answered(7),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", ["@", "@ soon", "@ 5 miles"])
+def test_a_pause_that_is_none_is_said_with_its_line_and_the_remedy(line: str) -> None:
+    with pytest.raises(ValueError, match=r"line 2: .* @ 500 ms"):
+        parse(f"+1\n{line}\n")
+
+
+class Bench:
+    """As much of a bench as a script needs: time goes on by a quarter second whenever somebody waits for it."""
+
+    def __init__(self) -> None:
+        self.state = SimpleNamespace(now=0)
+        self.picture = SimpleNamespace(lines={"bar": SimpleNamespace(units=("bar",))})
+        self.sent: list[tuple[int, str]] = []
+        self.answers = 0
+
+    async def type(self, unit: str, text: str) -> None:
+        if text == "BAD":
+            raise RuntimeError("bar has no supply")
+        self.sent.append((self.state.now, text))
+
+    async def until(self, condition: Callable[[Any], bool]) -> None:
+        while not condition(self.state):
+            self.state.now += SECOND // 4
+            if self.sent and self.state.now >= self.sent[-1][0] + SECOND:
+                self.answers = len(self.sent)
+            await asyncio.sleep(0)
+
+    def terminal(self, line: str) -> Any:
+        return SimpleNamespace(rows=[SimpleNamespace(whole=True, sender="bar")] * self.answers)
+
+
+def run(text: str, then: Callable[[Errands], None] = lambda errands: None) -> tuple[Bench, Live]:
+    """A script run to its end; `then` is called once it has begun."""
+    bench, live = Bench(), Live()
+
+    async def whole() -> None:
+        errands = Errands(bench, live)  # type: ignore[arg-type]
+        errands.start("bar", "bar", text)
+        await asyncio.sleep(0)
+        then(errands)
+        while live.get("script.bar")["running"]:  # type: ignore[index,call-overload]
+            await asyncio.sleep(0)
+
+    asyncio.run(whole())
+    return bench, live
+
+
+def test_commands_go_out_in_order_with_pauses_in_the_time_of_the_cell() -> None:
+    bench, live = run("+1\n+2\n@ 1.5\n+3\n")
+    assert bench.sent == [(0, "+1"), (0, "+2"), (3 * SECOND // 2, "+3")]
+    assert live.get("script.bar") == {"running": False, "line": 0, "told": "done"}
+
+
+def test_a_script_can_wait_for_the_answer_to_its_last_command() -> None:
+    bench, _ = run("+1\n@ answer\n+2\n@ answer\n+3\n")
+    assert bench.sent == [(0, "+1"), (SECOND, "+2"), (2 * SECOND, "+3")]
+
+
+def test_a_command_that_cannot_be_sent_ends_the_script_and_says_where() -> None:
+    bench, live = run("+1\nBAD\n+2\n")
+    assert [text for _, text in bench.sent] == ["+1"]
+    assert live.get("script.bar") == {"running": False, "line": 2, "told": "line 2: bar has no supply"}
+
+
+def test_a_script_that_is_stopped_sends_no_more() -> None:
+    bench, live = run("+1\n@ 1000\n+2\n", lambda errands: errands.stop("bar"))
+    assert [text for _, text in bench.sent] == ["+1"]
+    assert live.get("script.bar") == {"running": False, "line": 0, "told": "stopped"}
+
+
+def test_a_script_needs_something_to_send_and_a_unit_on_the_line() -> None:
+    errands = Errands(Bench(), Live())  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="nothing to send"):
+        errands.start("bar", "bar", "; nothing\n")
+    with pytest.raises(ValueError, match="drill is not on line bar"):
+        errands.start("bar", "drill", "+1")
+    with pytest.raises(KeyError):
+        errands.start("foo", "bar", "+1")

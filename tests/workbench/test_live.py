@@ -1,0 +1,186 @@
+"""The table that windows look at: what goes out, and what comes of a call."""
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Any
+
+import pytest
+from pydantic import Field
+from starlette.websockets import WebSocketDisconnect
+
+from detent.workbench.live import Live
+
+
+class Socket:
+    """A window's socket: `sent` by the server, `calls` by the window; it leaves once `leave` is set."""
+
+    def __init__(self, *calls: object) -> None:
+        self.sent: list[dict[str, Any]] = []
+        self._calls = [json.dumps(call) if not isinstance(call, str) else call for call in calls]
+        self.leave = asyncio.Event()
+        self.ready = asyncio.Event()  # as many answers as calls have come
+        self.open = asyncio.Event()
+        self.open.set()  # cleared: the window takes nothing
+
+    async def accept(self) -> None:
+        pass
+
+    async def receive_text(self) -> str:
+        if self._calls:
+            return self._calls.pop(0)
+        await self.leave.wait()
+        raise WebSocketDisconnect
+
+    async def send_text(self, text: str) -> None:
+        await self.open.wait()
+        self.sent.append(json.loads(text))
+        self.ready.set()
+
+    async def close(self) -> None:
+        pass
+
+    def values(self) -> dict[str, Any]:
+        """The table as this window knows it."""
+        known: dict[str, Any] = {}
+        for message in self.sent:
+            known |= message.get("set", {})
+        return known
+
+    async def until(self, condition: Callable[[], object]) -> None:
+        while not condition():
+            self.ready.clear()
+            await self.ready.wait()
+
+
+async def with_window(live: Live, socket: Socket, then: Callable[[], Awaitable[None]]) -> None:
+    serving = asyncio.create_task(live.serve(socket))  # type: ignore[arg-type]
+    await socket.until(socket.values)
+    await then()
+    socket.leave.set()
+    await serving
+
+
+def answers(live: Live, *calls: object) -> list[dict[str, Any]]:
+    """What a window gets back for its calls, by their numbers."""
+    wanted = [call["id"] for call in calls if isinstance(call, dict) and "id" in call]
+
+    async def run() -> list[dict[str, Any]]:
+        socket = Socket(*calls)
+
+        def found() -> list[dict[str, Any]]:
+            return [message for message in socket.sent if "id" in message]
+
+        async def wait() -> None:
+            await socket.until(lambda: len(found()) == len(wanted))
+
+        await with_window(live, socket, wait)
+        return sorted(found(), key=lambda answer: answer["id"])
+
+    return asyncio.run(run())
+
+
+@pytest.fixture
+def live() -> Live:
+    made = Live()
+
+    async def add(a: int, b: Annotated[int, Field(ge=0, le=9)] = 1) -> int:
+        return a + b
+
+    async def fail(kind: str) -> None:
+        raise {"key": KeyError("no unit 'x'"), "file": OSError(2, "No such file"), "run": RuntimeError("it is gone")}[
+            kind
+        ]
+
+    made.offer("add", add)
+    made.offer("fail", fail)
+    return made
+
+
+def test_a_new_window_gets_the_whole_table_and_then_what_changes(live: Live) -> None:
+    live.put({"now": 1, "held": False})
+
+    async def run() -> None:
+        socket = Socket()
+
+        async def change() -> None:
+            live.put({"now": 2, "held": False})
+            await socket.until(lambda: socket.values()["now"] == 2)
+
+        await with_window(live, socket, change)
+        assert socket.sent[0]["set"]["held"] is False
+        assert all("held" not in message["set"] for message in socket.sent[1:])
+
+    asyncio.run(run())
+
+
+def test_a_slow_window_gets_the_newest_value_and_no_queue(live: Live) -> None:
+    live.put({"now": 0})
+
+    async def run() -> None:
+        socket = Socket()
+
+        async def change() -> None:
+            socket.open.clear()
+            for now in range(1, 101):
+                live.put({"now": now})
+                await asyncio.sleep(0)
+            socket.open.set()
+            await socket.until(lambda: socket.values()["now"] == 100)
+
+        await with_window(live, socket, change)
+        assert len(socket.sent) < 5
+
+    asyncio.run(run())
+
+
+def test_windows_are_counted_for_everybody(live: Live) -> None:
+    async def run() -> None:
+        one, two = Socket(), Socket()
+
+        async def second() -> None:
+            async def nothing() -> None:
+                await one.until(lambda: one.values()["windows"] == 2)
+
+            await with_window(live, two, nothing)
+            await one.until(lambda: one.values()["windows"] == 1)
+
+        await with_window(live, one, second)
+        assert live.windows == 0
+
+    asyncio.run(run())
+
+
+def test_a_call_is_answered_with_its_value_or_with_the_reason_why_not(live: Live) -> None:
+    found = answers(
+        live,
+        {"id": 1, "call": "add", "args": [40, 2]},
+        {"id": 2, "call": "add", "args": [40, 12]},
+        {"id": 3, "call": "add", "args": ["x"]},
+        {"id": 4, "call": "add", "args": [1, 2, 3]},
+        {"id": 5, "call": "sing", "args": []},
+        {"id": 6, "call": "fail", "args": ["key"]},
+        {"id": 7, "call": "fail", "args": ["file"]},
+        {"id": 8, "call": "fail", "args": ["run"]},
+    )
+    assert found[0] == {"id": 1, "value": 42}
+    assert "less than or equal to 9" in found[1]["error"]
+    assert "valid integer" in found[2]["error"]
+    assert "add: " in found[3]["error"]
+    assert found[4]["error"] == "there is no call 'sing'"
+    assert found[5]["error"] == "no unit 'x'"
+    assert "No such file" in found[6]["error"]
+    assert found[7]["error"] == "it is gone"
+
+
+@pytest.mark.parametrize("garbage", ["", "{", "[]", "7", '{"call": "add"}', '{"id": "x", "call": "add"}'])
+def test_garbage_from_a_window_is_ignored(live: Live, garbage: str) -> None:
+    assert answers(live, garbage, {"id": 1, "call": "add", "args": [1]}) == [{"id": 1, "value": 2}]
+
+
+def test_a_call_is_offered_once(live: Live) -> None:
+    async def add() -> None:
+        pass
+
+    with pytest.raises(ValueError, match="already"):
+        live.offer("add", add)
