@@ -171,7 +171,8 @@ def _print_end(cell: "Cell", told: list[Told], files: Mapping[str, Path], place:
     print()
     print(f"Look at   {files['figure']}   with any viewer of pictures: positions, speeds, handshake")
     print(f"     and  {files['waveforms']}   with gtkwave or PulseView: every pin, every pulse, to the nanosecond")
-    print("Run it live, with a serial port for each unit:")
+    print("Watch it run in a browser, or serve it to host programs, with a serial port for each unit:")
+    print(f"    {_called()} workbench")
     print(f"    {_called()} serve {shown}")
 
 
