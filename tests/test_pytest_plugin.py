@@ -110,6 +110,19 @@ def test_what_does_not_come_is_told_with_the_state(detent: Bench) -> None:
         unit.wait(position=5, timeout=0.01)
 
 
+def test_a_run_that_takes_too_long_is_told(detent: Bench) -> None:
+    unit = detent.serve("gs-c200")
+    with pytest.raises(TimeoutError, match="has not run for 1000 s"):
+        unit.run_for("1000 s", timeout=0.01)
+
+
+def test_an_axis_that_there_is_not_is_told_with_a_remedy(detent: Bench) -> None:
+    with pytest.raises(AskedWrongly, match="gs-c200 has no axis 'x'; leave the axis out"):
+        detent.serve("gs-c200").position("x")
+    with pytest.raises(AskedWrongly, match="bs0610 has no axis 'Z'; there are: X, Y"):
+        detent.serve("bs0610").position("Z")
+
+
 @pytest.mark.parametrize(
     ("target", "says"), [("gs-c20", "did you mean gs-c200"), ("nowhere.toml", "nowhere.toml: cannot read it")]
 )

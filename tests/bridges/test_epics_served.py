@@ -304,3 +304,13 @@ def test_a_port_that_is_not_there_fails_in_one_line(capsys: pytest.CaptureFixtur
     assert code == 1
     assert err.startswith("detent: /dev/no-such-port cannot be opened: ")
     assert err.count("\n") == 1
+
+
+def test_an_address_that_is_not_this_computers_fails_in_one_line() -> None:
+    words = ["epics", "gs-c200", "--interfaces", "192.0.2.1"]  # an address of documentation (RFC 5737)
+    # in a process of its own: the sockets that caproto has tried are left to the collector
+    ended = subprocess.run([sys.executable, "-m", "detent", *words], capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("detent: Channel Access cannot be served: ")
+    assert "choose another --ca-port or --interfaces" in ended.stderr
+    assert ended.stderr.count("\n") == 1

@@ -147,6 +147,19 @@ def test_a_dip_switches_the_supply_off_and_on_again() -> None:
         made.breaks(SupplyDip("a"))
 
 
+@pytest.mark.parametrize("on", [False, True])
+def test_after_a_dip_the_supply_is_as_its_switch_is_then(on: bool) -> None:
+    made = cell(ONE)
+    made.breaks(SupplyDip("a"), 20 * MS)
+    made.power("a", False)
+    if on:
+        made.power("a", True)
+    assert not made.supplied(0), "no switch ends a dip"
+    made.run_to(made.now + 1 * SECOND)
+    assert made.supplied(0) == on
+    assert answers(made, "V1") == (["V0"] if on else [])
+
+
 @pytest.mark.parametrize(
     ("fault", "says"),
     [

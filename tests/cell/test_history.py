@@ -407,7 +407,7 @@ def test_a_loop_without_end_in_one_instant_stops_it_and_one_can_go_back() -> Non
 
 
 def _oscillation() -> Exception:
-    from detent.cell.cell import Oscillation
+    from detent.cell.delivery import Oscillation
 
     return Oscillation("a.UO1, b.UI1 change each other without end")
 
@@ -460,6 +460,9 @@ class TestDeeds:
         assert spans.position == 400
         with pytest.raises(ValueError, match="whole steps"):
             history.do(PlaceSwitch("end", 10.5, None))
+        for nowhere in (float("inf"), float("-inf"), float("nan")):
+            with pytest.raises(ValueError, match="whole steps"):
+                history.do(PlaceSwitch("end", nowhere, None))
         with pytest.raises(ValueError, match="before it begins"):
             history.do(PlaceSwitch("end", 10, 5))
         with pytest.raises(KeyError):

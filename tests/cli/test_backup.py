@@ -72,7 +72,9 @@ def test_a_dcb_274_comes_back_byte_for_byte(tmp_path: Path, capsys: pytest.Captu
     assert re.search(r"^read back \d+ bytes: as in the backup$", capsys.readouterr().out, re.MULTILINE)
     text = file.read_text()
     assert '    "+ 1001",  # Move in plus direction.' in text
-    assert "# What is written back is memory; the rest is there to be read." in text
+    assert "# What is written back is memory, bytes with their addresses; the rest is there to be read." in text
+    assert re.search(r'^    "eb e9 03 00 .*",  # 0$', text, re.MULTILINE)
+    assert re.search(r'^    "ff .*",  # 2032$', text, re.MULTILINE)
 
 
 def test_the_settings_of_a_board_fit_both_boards(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -136,6 +138,54 @@ def test_a_restore_that_fails_half_way_says_what_is_where_and_loses_nothing(
     (kept,) = (state / "detent" / "before-restore").iterdir()
     assert f"what the unit held before is in {kept}" in err
     assert Backup.parse(kept.read_text()).saved["program"] == ["C1"]
+
+
+def test_a_restore_that_is_interrupted_names_both_files_and_can_be_done_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, state: Path
+) -> None:
+    def interrupted(self: BlockingGsC200) -> None:
+        raise KeyboardInterrupt
+
+    file = tmp_path / "drill.toml"
+    with served("gs-c200s") as service:
+        with connect("gs-c200s", address(service)) as unit:
+            unit.write_program(["C1"])
+            unit.save()
+        run("backup", "gs-c200s", address(service), file)
+        file.write_text(file.read_text().replace('"C1"', '"A1"'))
+        with monkeypatch.context() as patched:
+            patched.setattr("detent.hosts.gsc200.GsC200.leave_programming", interrupted)  # stored, and not yet saved
+            run("restore", "gs-c200s", address(service), file, "--yes", status=130)
+        (kept,) = (state / "detent" / "before-restore").iterdir()
+        err = capsys.readouterr().err
+        assert err.count("\n") == 1
+        assert f"the unit may hold part of {file}" in err
+        assert f"detent restore gs-c200s {address(service)} {kept} what it held before" in err
+        # the module is still in programming mode, where X is "not allowed" (E4)
+        run("restore", "gs-c200s", address(service), kept, "--yes")
+        run("backup", "gs-c200s", address(service), file)
+    assert Backup.parse(file.read_text()).saved["program"] == ["C1"]
+    assert "ram" not in Backup.parse(file.read_text()).saved
+
+
+def test_a_gs_c200_in_programming_mode_says_how_to_leave_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "drill.toml"
+    with served("gs-c200") as service:
+        run("backup", "gs-c200", address(service), file)
+        with connect("gs-c200", address(service)) as unit:
+            unit.write_program(["C1"])
+        run("restore", "gs-c200", address(service), file, "--yes", status=1)
+    assert "it is in programming mode, which a GS-C200 leaves only by execute()" in capsys.readouterr().err
+
+
+def test_a_line_that_is_none_of_the_models_is_found_before_anything_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "drill.toml"
+    file.write_text(Backup("gs-c200", {"program": ["A9"]}).text())
+    with served("gs-c200") as service:
+        run("restore", "gs-c200", address(service), file, "--yes", status=2)
+    assert f"detent: {file}: program: line 1: 'A9': the number must be 1 to 3" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

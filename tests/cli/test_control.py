@@ -130,6 +130,17 @@ def test_the_token_is_given_by_option_or_environment(
         http.close()
 
 
+def test_help_of_a_verb_tells_its_arguments(capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(capsys, "http://127.0.0.1:1", "help", "switch")
+    assert "0, 1, low or high" in out
+    assert "resume" not in out
+    assert "cable-out" in run(capsys, "http://127.0.0.1:1", "help", "fault")[1]
+    assert told(capsys, "http://127.0.0.1:1", "help", "switch") == {"switch": ["switch", "level"]}
+    status, _, err = run(capsys, "http://127.0.0.1:1", "help", "swich")
+    assert status == 2
+    assert "did you mean switch?" in err
+
+
 def test_help_lists_every_verb_and_every_fault(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = run(capsys, "http://127.0.0.1:1", "help")
     for name in (*verbs.VERBS, *verbs.FAULTS):

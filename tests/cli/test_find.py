@@ -5,6 +5,8 @@ import pytest
 from tests.realtime.served import address, served
 
 from detent.cli import main
+from detent.realtime.connect import connect
+from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.finding import Listed
 
 
@@ -63,6 +65,26 @@ def test_the_ports_of_the_computer_are_looked_at_if_none_is_named(
     monkeypatch.setattr("detent.realtime.finding.listed", list)
     run(status=1)
     assert "this computer has no serial ports; name one" in capsys.readouterr().err
+
+
+def test_a_port_that_another_client_has_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    with (
+        served("gs-c200", wanted=[Wanted("tcp", "127.0.0.1:0")]) as service,
+        connect("gs-c200", address(service)) as unit,
+    ):
+        unit.position()
+        run(address(service), "--model", "gs-c200", status=1)
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.endswith("the other end closed it; it may serve one client at a time, and have one\n")
+    assert err.count("\n") == 1
+
+
+def test_a_port_that_is_not_there_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    run("/dev/no-such-device", status=1)
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("detent: /dev/no-such-device cannot be opened: there is no such device")
 
 
 def test_where_nobody_answers_it_ends_with_1(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -35,6 +35,12 @@ def test_a_line_with_a_hyphen_stands_behind_two(capsys: pytest.CaptureFixture[st
         assert out == "> -100\n< Y  (done, stored or begun)\n"
 
 
+def test_a_mistyped_option_is_not_sent_to_the_unit(capsys: pytest.CaptureFixture[str]) -> None:
+    out, err = told(capsys, "gs-c200s", "/dev/no-such-device", "F", "--adress", "3", status=2)
+    assert out == ""
+    assert "Did you mean --address?" in err
+
+
 def test_a_refused_line_ends_it_with_1_and_the_datasheets_words(capsys: pytest.CaptureFixture[str]) -> None:
     # "E2: command argument out of limit or not requested"
     with served("gs-c200") as service:
@@ -53,6 +59,13 @@ def test_json_has_what_was_said(capsys: pytest.CaptureFixture[str]) -> None:
         out, _ = told(capsys, "gs-c200", address(service), "F", "--json")
     found: dict[str, Any] = json.loads(out)
     assert found["exchanges"] == [{"sent": "F", "answers": ["R"], "meaning": "ready", "refused": False}]
+
+
+def test_json_has_what_was_said_before_something_failed(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("supersigma") as service:
+        out, err = told(capsys, "supersigma", address(service), "move 100", "jump", "--json", status=2)
+    assert [exchange["sent"] for exchange in json.loads(out)["exchanges"]] == ["move 100"]
+    assert "type move STEPS" in err
 
 
 def test_bytes_go_out_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
@@ -104,6 +117,7 @@ def test_a_module_with_checksums_tells_who_sends_none(capsys: pytest.CaptureFixt
     [
         (("gs-c20", "PORT", "F"), 2, "did you mean gs-c200?"),
         (("gs-c200", "PORT"), 2, "say what to send: detent send MODEL PORT LINE"),
+        (("gs-c200", "PORT", "F", "--raw", "--wait", "-1"), 2, "--wait -1: say 0 seconds or more"),
         (("gs-c200", "PORT", "F", "--name", "A"), 2, "--name is not for a gs-c200; it takes --address, --no-checksum"),
         (("gs-c200", "PORT", "F", "--address", "9"), 2, "an address is 1 to 7"),
         (("gs-c200", "/dev/no-such-device", "F"), 1, "there is no such device; detent find"),

@@ -123,6 +123,14 @@ def test_what_cannot_be_is_refused_before_a_port_is_opened() -> None:
         connect("gs-c200", "/dev/no-such-device", adress=2)  # type: ignore[call-overload]
     with pytest.raises(ValueError, match="an address is 1 to 7"):
         connect("gs-c200", "/dev/no-such-device", address=8)
+    with pytest.raises(ValueError, match="parity 'od': choose from none, odd, even"):
+        connect("gs-c200", "/dev/no-such-device", parity="od")
+    with pytest.raises(ValueError, match="data_bits 9: choose from 5, 6, 7, 8"):
+        connect("gs-c200", "/dev/no-such-device", data_bits=9)
+    with pytest.raises(ValueError, match="baud 0: a line has bits a second, like 9600"):
+        connect("gs-c200", "/dev/no-such-device", baud=0)
+    with pytest.raises(ValueError, match="patience -1: a unit needs some time to answer"):
+        connect("gs-c200", "/dev/no-such-device", patience=-1)
     with pytest.raises(PortError, match="no such device"):
         connect("gs-c200", "/dev/no-such-device")
 

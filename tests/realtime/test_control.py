@@ -7,6 +7,7 @@ import pytest
 from tests.realtime.controlled import controlled, no_file, one, slide
 
 from detent.cell.cell import Cell
+from detent.cell.description import parse, single
 from detent.realtime import verbs
 from detent.realtime.control import Control, Ending
 from detent.realtime.service import Service
@@ -141,6 +142,8 @@ def test_what_is_refused_is_told_with_the_reason(cell: Control) -> None:
     assert slide["refused"]["frame"] == "U9"
     assert slide["said"].startswith("E")
     assert slide["received"] == 3
+    cell.call("power", {"unit": "slide", "on": False})
+    assert unit(cell, "slide")["refused"] is None
 
 
 def test_characters_are_sent_as_they_are_written(cell: Control) -> None:
@@ -161,6 +164,7 @@ def test_faults_tell_what_they_have_struck(cell: Control) -> None:
     events: Any = cell.call("state", {})["events"]
     assert (events[-1]["event"], events[-1]["before"]["value"]) == ("lost", ord("V"))
     assert cell.call("mend", {"fault": 1})["mended"] == [1]
+    assert cell.call("mend", {"fault": 1})["mended"] == [], "it is over"
     assert cell.call("faults", {})["faults"] == []
 
 
@@ -229,7 +233,7 @@ def test_events_take_no_room_without_end(cell: Control) -> None:
         ("state", {"unit": "a"}, "state takes no arguments; leave out unit"),
         ("pins", {"unt": "slide"}, "no argument of pins 'unt'; did you mean unit?"),
         ("pins", {"unit": "slid"}, "no unit 'slid'; did you mean slide?"),
-        ("set", {"pin": "slide.UI3"}, "set: level is missing; it is the level"),
+        ("set", {"pin": "slide.UI3"}, "set: level is missing; it takes 0, 1, low or high: the level"),
         ("set", {"pin": "slide.UI3", "level": 2}, "level cannot be 2; it takes 0, 1, low or high"),
         ("set", {"pin": "slide.UI4", "level": 1}, "no input of slide 'UI4'; did you mean UI"),
         ("set", {"pin": "slide.UO1", "level": 1}, "no input of slide 'UO1'"),
@@ -244,7 +248,8 @@ def test_events_take_no_room_without_end(cell: Control) -> None:
         ("wait", {}, "wait: for what; name a state"),
         ("wait", {"level": 1}, "wait: a level of what; name the pin too"),
         ("wait", {"unit": "watch", "position": 3}, "watch moves no axis; name one of: slide, other"),
-        ("wait", {"unit": "slide", "position": 3, "axis": "X"}, "no axis of slide 'X'"),
+        ("wait", {"unit": "slide", "position": 3, "axis": "X"}, "slide has no axis 'X'; it has only one"),
+        ("wait", {"time": 1, "timeout": 1e12}, "timeout cannot be 1000000000000.0; it takes seconds, at most a day"),
         ("wait", {"unit": "slide", "position": True}, "position cannot be True; it takes a whole number"),
         ("fault", {"where": "slide", "kind": "bit-eror"}, "no kind of fault 'bit-eror'; did you mean bit-errors?"),
         ("fault", {"where": "slide", "kind": "dip", "rate": 1}, "a fault dip takes no rate; it takes: for"),
@@ -320,3 +325,26 @@ def test_watching_a_cell_that_keeps_pace_changes_nothing() -> None:
         control.call("type", {"text": "+10"})
         control.call("wait", {"state": "ready", "position": 10})
         assert control.call("state", {})["pace"] == 1.0
+
+
+CHAIN = """
+[units.first]
+model = "dcb-274"
+[units.last]
+model = "dcb-274"
+[lines.chain]
+kind = "daisy-chain"
+units = ["first", "last"]
+"""
+
+
+def test_straps_are_told_as_the_units_of_a_daisy_chain_read_them() -> None:
+    with controlled(parse(CHAIN, "chain.toml")) as chain:
+        pins: Any = chain.call("pins", {})["pins"]
+    assert [pins[unit]["PARTY"]["level"] for unit in ("first", "last")] == [0, 0], "each link is a line of its own"
+
+
+def test_an_output_of_which_nobody_is_told_has_no_level() -> None:
+    with controlled(single("bs0610")) as board:
+        pins: Any = board.call("pins", {})["pins"]["bs0610"]
+    assert (pins["XWA1"]["level"], pins["RDY"]["level"]) == (None, 1)

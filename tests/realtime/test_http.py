@@ -105,7 +105,7 @@ def test_waiting_is_one_request(served: HttpControl) -> None:
         ("DELETE", "/state", None, 405, "DELETE is not for /state", "use POST"),
         ("POST", "/", {}, 405, "POST is not for /", "use GET"),
         ("BREW", "/state", None, 405, "Unsupported method ('BREW')", "GET / lists the verbs"),
-        ("POST", "/type", {}, 400, "type: text is missing", "it is the command line"),
+        ("POST", "/type", {}, 400, "type: text is missing", "it takes text: the command line"),
         ("POST", "/type", {"txt": "V1"}, 400, "no argument of type 'txt'", "did you mean text?"),
         ("POST", "/type", b"{", 400, "the body is no JSON", "send an object"),
         ("POST", "/type", b"\xff\xfe\x00", 400, "the body is no JSON", "send an object"),

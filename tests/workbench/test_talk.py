@@ -122,6 +122,18 @@ def test_supersigma_messages_are_bytes_with_a_meaning_each() -> None:
     assert rows[-1].note == "09h is no op-code"
 
 
+def test_the_lines_of_an_adapter_are_a_row_each() -> None:
+    """The SIN-10 answers each command with a line (manual of the DCB-274, page 19); ours end with CR LF."""
+    told = example("xyz-party-line")
+    told.run(500 * MS)
+    rows = said(told, "computer").rows
+    assert [row.data for row in rows[:4]] == [
+        b"&\r", b"X+1000;Y+1000;Z+1000;9W*;XZ;YZ;ZZ\r", b"XYZ\r\n", b"X+1000\r\n",
+    ]  # fmt: skip
+    assert parts(rows[2]) == [("answer", "XYZ"), ("end", "CR LF")]
+    assert not any(row.note or row.wrong for row in rows)
+
+
 def test_a_frame_that_is_not_finished_is_shown_and_asked_for_again() -> None:
     told = alone("gs-c200")
     told.history.do(Send(0, b"+10"))

@@ -46,7 +46,7 @@ class WriteFailure(NamedTuple):
 
 
 class SupplyDip(NamedTuple):
-    """A unit is without supply."""
+    """A unit is without supply, whatever its switch is at; afterwards it is as the switch is then."""
 
     unit: str
 
@@ -73,6 +73,7 @@ class Faults:
         self._deaf: dict[tuple[int, str], int] = {}  # stuck input -> fault
         self._readers: dict[int, Sequence[tuple[int, str]]] = {}  # of nets with stuck inputs: all of them
         self._writes_left: dict[int, int] = {}  # fault -> writes that it still spoils; -1: all
+        self._dips: dict[str, bool] = {}  # unit without supply -> whether its switch is on
 
     def known(self, number: int) -> bool:
         """Whether there is, or was, a fault of this number."""
@@ -101,6 +102,7 @@ class Faults:
                 index = cell.unit(unit)
                 if not cell.supplied(index):
                     raise ValueError(f"{unit} is switched off: switch it on first")
+                self._dips[unit] = True
                 cell.supply(index, False)
         self._count = number
         self.standing[number] = fault
@@ -131,7 +133,8 @@ class Faults:
             case WriteFailure():
                 del self._writes_left[number]
             case SupplyDip(unit):
-                cell.supply(cell.unit(unit), True)
+                if self._dips.pop(unit):
+                    cell.supply(cell.unit(unit), True)
 
     def holds(self, part: int, pin: str) -> bool:
         """Whether an input is stuck."""
@@ -140,6 +143,13 @@ class Faults:
     def readers(self, net: int) -> Sequence[tuple[int, str]]:
         """The inputs that are stuck, and the others on their net; none for a net without stuck inputs."""
         return self._readers.get(net, ())
+
+    def switches(self, unit: str, on: bool) -> bool:
+        """The switch of a unit's supply is put on or off; whether the unit is without supply all the same."""
+        if unit not in self._dips:
+            return False
+        self._dips[unit] = on
+        return True
 
     def writable(self, unit: str) -> bool:
         """Whether a write of the unit's memory that is made now may succeed; a failure is counted."""

@@ -7,13 +7,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
-from detent.cell.cell import Cell, Store, Wiring, no_store
+from detent.cell.cell import Cell
 from detent.cell.deeds import Action, Power, SetSwitch, Type
+from detent.cell.delivery import Store, no_store
 from detent.cell.description import Description, Problem, ScriptEntry, Unit
 from detent.cell.fitting import check_names, mechanics, motors_by_axis, split_axis
 from detent.cell.mechanics import Mechanics
 from detent.cell.parts import PARTS, Part
 from detent.cell.switches import AxisSwitch, Switch
+from detent.cell.wiring import Wiring
 from detent.controllers import catalogue
 from detent.controllers.catalogue import NO_LIMITS, CatalogueError, Model
 from detent.controllers.device import Controller, Device

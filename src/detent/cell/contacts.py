@@ -52,7 +52,7 @@ class Contact(NamedTuple):
         if self.lead < 0:
             begin, end = (-inf if high is None else end), (inf if low is None else begin)
         begin, end = begin - self.margin, end + self.margin
-        if begin >= end:
+        if not begin < end:  # or one of them is NaN
             raise ValueError(f"switch {self.name} has no width: give from and to, in this order")
         return self._replace(low=begin, high=end)
 

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from detent.cell.cell import Cell, Oscillation
+from detent.cell.cell import Cell
 from detent.cell.deeds import Action, Deed, Send
+from detent.cell.delivery import Oscillation
 from detent.cell.mechanics import Mechanics
 from detent.cell.panel import Panel
 from detent.cell.recording import Batch, Entry

@@ -1,6 +1,7 @@
 """What the panels of a cell's units show: levels of pins, the instruction, the latched error; from the recording.
 
-It is a fold over the recording, so that a copy of it belongs to a copy of the cell.
+It is a fold over the recording, so that a copy of it belongs to a copy of the cell. The past of a cell (`cell.history`)
+and a cell that is only watched (`realtime.watch`) show the same.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -41,18 +42,20 @@ class Travel:
 
 
 class Front:
-    """The panel of one unit. `levels` are those of inputs, straps and outputs; None without supply."""
+    """The panel of one unit. `levels` are those of inputs, straps and outputs; None for an output that is let go.
 
-    __slots__ = ("_outputs", "executing", "levels", "powered", "refused", "stored", "travels")
+    An output of which nobody is told (a winding without a wire) is None too. `refused` is cleared by the supply.
+    """
+
+    __slots__ = ("_let_go", "executing", "levels", "powered", "refused", "stored", "travels")
 
     def __init__(self, device: Device, shaft: int) -> None:
         axes: Sequence[str] = getattr(device, "axes", ())
         self.powered = not axes  # a part that moves nothing tells nothing of its supply
-        self._outputs = {pin.name: pin.rest for pin in device.pins if pin.kind.drives}
+        self._let_go: Mapping[str, None] = dict.fromkeys(pin.name for pin in device.pins if pin.kind.drives)
         resting = {pin.name: pin.rest for pin in device.pins if pin.kind.reads}
         straps: Mapping[str, Level] = getattr(device, "straps", {})
-        outputs: Mapping[str, Level | None] = self._outputs if self.powered else dict.fromkeys(self._outputs)
-        self.levels: dict[str, Level | None] = {**resting, **straps, **outputs}
+        self.levels: dict[str, Level | None] = {**resting, **straps, **self._let_go}
         self.travels = {axis: Travel(shaft) for axis in axes}
         self.executing: Executing | None = None
         self.refused: Refused | None = None
@@ -87,7 +90,8 @@ class Front:
                 return True
             case Powered():
                 self.powered = entry.on
-                self.levels |= self._outputs if entry.on else dict.fromkeys(self._outputs)
+                if not entry.on:  # when it is switched on, it tells each of them
+                    self.levels |= self._let_go
                 self.executing = self.refused = None
                 return True
         return False

@@ -99,7 +99,7 @@ class AxisSwitch(Switch):
 
     def move_contact(self, name: str, low: float | None, high: float | None, now: Ns) -> None:
         """Put it elsewhere: whole steps. ValueError for others, and for an end before the beginning."""
-        if any(place is not None and place != int(place) for place in (low, high)):
+        if any(place is not None and place % 1 != 0 for place in (low, high)):  # nor infinity, nor NaN
             raise ValueError(f"switch {name} is placed in whole steps")
         if low is None and high is None:
             raise ValueError(f"switch {name} needs a place: an end at least")

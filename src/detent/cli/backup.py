@@ -123,8 +123,15 @@ def restore(
     with progress(f"writing to the {model}") as watch, connected(model, port, unit, watch) as found:
         try:
             told = cast("Keeper", found).restore(wanted.saved)
+        except ValueError as error:  # of what the file says; nothing was written
+            asked_wrongly(BackupError(f"{file}: {error}"))
         except DriverError:
             print(f"detent: what the unit held before is in {before}", file=sys.stderr)
+            raise
+        except KeyboardInterrupt:
+            again = f"detent restore {model} {port}"
+            print(f"detent: interrupted: the unit may hold part of {file}; {again} {file} writes the rest, "
+                  f"{again} {before} what it held before", file=sys.stderr)  # fmt: skip
             raise
     _tell(json, file, differences, told, before)
 

@@ -24,7 +24,7 @@ def control(
     """Look at a cell that is served, meddle with it, break it.
 
     `detent serve TARGET --control 127.0.0.1:8400` prints the URL. Behind it a verb with its arguments, by place or as
-    --NAME VALUE; without a verb the state is shown, and `help` lists the verbs:
+    --NAME VALUE; without a verb the state is shown, and `help` lists the verbs (`help VERB`: its arguments):
 
     detent control URL fault bar bit-errors --rate 0.01
 
@@ -44,10 +44,10 @@ def control(
     from detent.realtime.verbs import AskedWrongly
 
     name, *given = words or ("state",)
-    if name in ("help", "verbs"):
-        _print_verbs(json)
-        return
     try:
+        if name in ("help", "verbs"):
+            _print_help([verbs.verb(other) for other in given], json)
+            return
         verb = verbs.verb(name)
         arguments = placed(verb, given)
         read = verb.read(arguments)
@@ -207,17 +207,25 @@ def _print_faults(console: "Console", faults: Sequence[dict[str, Any]]) -> None:
     console.print(_table("faults", ["fault", "kind", "where", "how", "struck"], rows))
 
 
-def _print_verbs(json: bool) -> None:
+def _print_help(asked: "Sequence[Verb]", json: bool) -> None:
+    """The verbs that were asked for, each with its arguments; all, and the faults, if none was."""
     from rich.console import Console
 
     from detent.realtime.verbs import FAULTS, VERBS
 
+    shown = asked or list(VERBS.values())
     if json:
-        print(json_text.dumps({name: [p.name for p in verb.parameters] for name, verb in VERBS.items()}))
+        print(json_text.dumps({verb.name: [p.name for p in verb.parameters] for verb in shown}))
         return
     console = Console(highlight=False)
     console.print(_table("verbs", ["verb", "arguments", "what"],
-                         ([name, usage(verb), verb.help] for name, verb in VERBS.items())))  # fmt: skip
+                         ([verb.name, usage(verb), verb.help] for verb in shown)))  # fmt: skip
+    for verb in asked:
+        if verb.parameters:
+            rows = ([p.name, p.kind.takes, p.help] for p in verb.parameters)
+            console.print(_table(f"arguments of {verb.name}", ["argument", "takes", "what"], rows))
+    if asked and all(verb.name != "fault" for verb in asked):
+        return
     faults = ([kind.name, kind.where, " ".join(kind.takes), kind.help] for kind in FAULTS.values())
     console.print(_table("faults", ["kind", "where", "arguments", "what"], faults))
 

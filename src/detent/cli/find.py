@@ -62,6 +62,8 @@ def find(
         print(json_text.dumps([_facts(search, unit) for search, unit in found]))
     else:
         _print(found)
+        if results and not found:
+            print("Nothing was found. Is it switched on, are TXD and RXD crossed, does it run a program?")
     if not found:
         raise SystemExit(FAILED)
 
@@ -152,5 +154,3 @@ def _print(found: "list[tuple[Search, Found]]") -> None:
         device = f" ({search.what})" if search.what else ""
         print(f"{search.port}{device}: {unit.model}{form}{which}{checksum}: {unit.says}")
         print(f"    {_command(search, unit)}")
-    if not found:
-        print("Nothing was found. Is it switched on, are TXD and RXD crossed, does it run a program?")

@@ -65,7 +65,7 @@ def run(
         Print the result as one line of JSON.
     """
     from detent.cell.build import build
-    from detent.cell.cell import Oscillation
+    from detent.cell.delivery import Oscillation
     from detent.cell.description import Problem
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find

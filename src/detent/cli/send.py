@@ -1,9 +1,7 @@
 """The verb `send`: one exchange with a unit, real or emulated, from the command line."""
 
 import json as json_text
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from detent.cli import FAILED
 from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
@@ -15,7 +13,7 @@ if TYPE_CHECKING:
 def send(
     model: str,
     port: str,
-    *lines: Annotated[str, Parameter(allow_leading_hyphen=True)],
+    *lines: str,
     raw: bool = False,
     wait: float = 0.5,
     json: bool = False,
@@ -53,26 +51,30 @@ def send(
     try:
         if not lines:
             raise ValueError("say what to send: detent send MODEL PORT LINE...")
+        if not wait >= 0:
+            raise ValueError(f"--wait {wait:g}: say 0 seconds or more")
         data = [unescaped(line) for line in lines] if raw else []
     except ValueError as error:
         asked_wrongly(error)
     refused, told = False, []
-    with connected(model, port, unit) as found:
-        if raw:
-            for sent in data:
-                came = found.perform(exchange(sent, wait))
-                told.append({"sent": escaped(sent), "received": escaped(came)})
-                if not json:
-                    print(f"> {escaped(sent)}\n< {escaped(came)}", flush=True)
-        else:
-            for line in lines:
-                said = found.perform(say(found.driver, line))
-                refused |= said.refused
-                told.append({"sent": line, **said._asdict()})
-                if not json:
-                    print(f"> {line}\n{shown(said)}", flush=True)
-    if json:
-        print(json_text.dumps({"model": model, "port": port, "exchanges": told}))
+    try:
+        with connected(model, port, unit) as found:
+            if raw:
+                for sent in data:
+                    came = found.perform(exchange(sent, wait))
+                    told.append({"sent": escaped(sent), "received": escaped(came)})
+                    if not json:
+                        print(f"> {escaped(sent)}\n< {escaped(came)}", flush=True)
+            else:
+                for line in lines:
+                    said = found.perform(say(found.driver, line))
+                    refused |= said.refused
+                    told.append({"sent": line, **said._asdict()})
+                    if not json:
+                        print(f"> {line}\n{shown(said)}", flush=True)
+    finally:  # what was said before something failed has been said, and may have moved something
+        if json and told:
+            print(json_text.dumps({"model": model, "port": port, "exchanges": told}), flush=True)
     if refused:
         raise SystemExit(FAILED)
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 if TYPE_CHECKING:
+    from detent.cell.cell import Cell
     from detent.cell.description import Description
     from detent.realtime.endpoints.tcp import TcpAddress
     from detent.realtime.endpoints.wanted import Wanted
@@ -68,7 +69,7 @@ def serve(
     json
         Print one line of JSON once everything is open, and nothing else.
     """
-    from detent.cell.cell import Oscillation
+    from detent.cell.delivery import Oscillation
     from detent.cell.description import Problem
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
@@ -179,7 +180,7 @@ def _print_ready(
     """Say what is served, and how to connect: a line to copy for each endpoint."""
     speed = "real time" if pace == 1 else f"{pace:g} times real time"
     print(f"Serving {', '.join(description.units)} in {speed}; EEPROM images in {folder}")
-    for unit, line in _straps(description):
+    for unit, line in _straps(description, service.cell):
         print(f"  {unit}: {line}")
     print("Connect:")
     width = max(len(endpoint.unit) for endpoint in service.endpoints)
@@ -203,14 +204,12 @@ def _hints(description: "Description") -> list[str]:
     return [hint for hint in dict.fromkeys(hints) if hint]
 
 
-def _straps(description: "Description") -> list[tuple[str, str]]:
+def _straps(description: "Description", cell: "Cell") -> list[tuple[str, str]]:
     """Every controller with its model and its straps as they are read."""
-    from detent.realtime.service import strap_levels
-
     listed = []
-    for unit, levels in strap_levels(description).items():
+    for unit, controller in cell.controllers().items():
         model = description.units[unit].model
-        text = " ".join(f"{pin}={level}" for pin, level in levels.items())
+        text = " ".join(f"{pin}={level}" for pin, level in controller.straps.items())
         listed.append((unit, f"{model}, straps {text}" if text else model))
     return listed
 

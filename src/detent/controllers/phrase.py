@@ -37,14 +37,17 @@ class Phrases(Protocol):
 
 
 class Lines:
-    """Lines of text that end with CR or LF, of whom nothing more is known."""
+    """Lines of text that end with CR or LF, those of a unit with CR LF; of whom nothing more is known."""
 
     def whole(self, data: bytes, to_unit: bool) -> bool:
-        """At CR or LF."""
-        return data[-1:] in (b"\r", b"\n")
+        """At LF, and towards the unit at CR."""
+        return data[-1:] == b"\n" or (to_unit and data[-1:] == b"\r")
 
     def read(self, data: bytes, to_unit: bool) -> Phrase:
         """The text as it is."""
         text = data.rstrip(b"\r\n")
-        pieces = (Piece(len(text), "unknown", "text"), Piece(len(data) - len(text), "end", "end of the line"))
-        return Phrase(tuple(piece for piece in pieces if piece.length), text.decode("latin-1"))
+        pieces = (
+            Piece(len(text), "argument" if to_unit else "answer", "text"),
+            Piece(len(data) - len(text), "end", "end of the line"),
+        )
+        return Phrase(tuple(piece for piece in pieces if piece.length), "")

@@ -28,7 +28,12 @@ class Limits(NamedTuple):
 
 
 class Axis(Driver):
-    """One axis. Moves begin and return; `wait` waits for their end. The methods marked so are each driver's own."""
+    """One axis. Moves begin and return; `wait` waits for their end.
+
+    What a move is told while another is under way is the controller's: a GS-C200 and a SUPERSIGMA raise Busy, a
+    DCB-274 begins it behind the one under way (the call returns then), a GenStepper board stops and goes to the new
+    target. `stop` and `wait` before it, and all of them do the same.
+    """
 
     poll = POLL
 

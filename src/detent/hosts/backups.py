@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 FORMAT: Final = "detent backup 1"
 KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
 PROGRAMS: Final = ("program", "ram")  # the keys under which lines are those of programs
+MEMORY: Final = "memory"  # the key under which lines are bytes from address 0 on
 
 Explain = Callable[[str], str]
 """Gives a line of help for a line of a program."""
@@ -29,8 +30,8 @@ class Backup(NamedTuple):
         """The file. Lines of programs have what `explain` says of them behind."""
         lines = [f"# {self.note}"] if self.note else []
         lines.append(f"# Back into the unit: detent restore {self.model} PORT FILE")
-        if "memory" in self.saved and not isinstance(self.saved["memory"], str):
-            lines.append("# What is written back is memory; the rest is there to be read.")
+        if not isinstance(self.saved.get(MEMORY, ""), str):
+            lines.append("# What is written back is memory, bytes with their addresses; the rest is there to be read.")
         lines += [
             "",
             f"format = {_value(FORMAT)}",
@@ -67,7 +68,12 @@ def _table(path: tuple[str, ...], values: Mapping[str, Any], explain: Explain) -
             continue
         if isinstance(value, list):
             lines.append(f"{_key(key)} = [")
-            lines += [f"    {_value(one)},{_comment(explain(one)) if key in PROGRAMS else ''}" for one in value]
+            address = 0
+            for one in value:
+                lines.append(f"    {_value(one)},{_comment(explain(one) if key in PROGRAMS else '')}")
+                if key == MEMORY:
+                    lines[-1] += _comment(str(address))
+                    address += len(str(one).split())
             lines.append("]")
         else:
             lines.append(f"{_key(key)} = {_value(value)}")

@@ -8,6 +8,11 @@ from typing import NamedTuple
 from detent.realtime.endpoints.tcp import TcpAddress
 
 CONNECT_SECONDS = 5.0  # how long the other side of a connection may take to answer
+CLOSED = {
+    "device": "the other end closed it, or it was unplugged",
+    "tcp": "the other end closed it; it may serve one client at a time, and have one",
+}
+"""What an end that nobody asked for means, by the kind of address."""
 TERMINALS = ("/dev/pts/", "/dev/ttys")  # pseudo-terminals of Linux, and of macOS
 
 
@@ -95,6 +100,8 @@ def _network(address: Address, error: Exception, number: int | None) -> str:
             return "nothing listens there; is the server started, and the port number right?"
         case errno.EHOSTUNREACH | errno.ENETUNREACH:
             return "the host cannot be reached"
+    if address.kind == "rfc2217" and "closed by server" in str(error):  # serialx has no number for it
+        return CLOSED["tcp"]
     return ""
 
 

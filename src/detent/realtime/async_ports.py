@@ -7,7 +7,7 @@ import time
 from contextlib import AbstractAsyncContextManager, suppress
 from typing import TYPE_CHECKING
 
-from detent.realtime.addresses import CONNECT_SECONDS, Address, port_error
+from detent.realtime.addresses import CLOSED, CONNECT_SECONDS, Address, port_error
 from detent.realtime.ports import STALLED_SECONDS, accepted, settings
 from detent.ticks import SECOND
 from detent.uart import Format
@@ -28,7 +28,9 @@ async def open_async_port(
 class _Inbox(asyncio.Protocol):
     """Keeps what comes until it is fetched, and wakes whoever waits for it."""
 
-    def __init__(self) -> None:
+    def __init__(self, closed: str) -> None:
+        """`closed` is what an end that nobody asked for means."""
+        self._closed = closed
         self.came = bytearray()
         self.lost: Exception | None = None
         self.waiting: asyncio.Future[None] | None = None
@@ -38,7 +40,7 @@ class _Inbox(asyncio.Protocol):
         self.wake()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        self.lost = exc or OSError(errno.EIO, "the other end closed it, or it was unplugged")
+        self.lost = exc or OSError(errno.EIO, self._closed)
         self.wake()
 
     def wake(self) -> None:
@@ -147,7 +149,7 @@ async def _connect(address: Address, form: Format) -> "tuple[BaseSerialTransport
 
     url = {"device": address.where, "tcp": f"socket://{address.where}"}.get(address.kind, str(address))
     kind: type[BaseSerialTransport] | None = serialx.SerialTransport if address.kind == "device" else None
-    inbox = _Inbox()
+    inbox = _Inbox(CLOSED["device" if kind else "tcp"])
     try:
         transport, _ = await serialx.create_serial_connection(
             asyncio.get_running_loop(),

@@ -54,6 +54,12 @@ HOSTS: dict[str, Host] = {
 }
 
 
+LINE: dict[str, tuple[int | str, ...]] = {
+    "data_bits": (5, 6, 7, 8), "parity": ("none", "odd", "even"), "stop_bits": (1, 2),
+}  # fmt: skip
+"""What the format of a line may be."""
+
+
 def host(model: str) -> Host:
     """How `model` is driven. Raises ValueError, with the likeliest of the models there are."""
     try:
@@ -164,8 +170,15 @@ async def connect_async(model: str, port: str | AsyncPort, **options: Any) -> An
 
 
 def _line(found: Host, options: dict[str, Any]) -> tuple[Format, Watch | None]:
-    """The format, taken out of the options, and who watches."""
+    """The format, taken out of the options, and who watches. Raises ValueError for what no line is, nor patience."""
     form = found.form._replace(**{name: options.pop(name) for name in Format._fields if name in options})
+    if form.baud < 1:
+        raise ValueError(f"baud {form.baud}: a line has bits a second, like {found.form.baud}")
+    for name, kinds in LINE.items():
+        if getattr(form, name) not in kinds:
+            raise ValueError(f"{name} {getattr(form, name)!r}: choose from {', '.join(map(str, kinds))}")
+    if not options.get("patience", 1.0) > 0:
+        raise ValueError(f"patience {options['patience']:g}: a unit needs some time to answer, like 1 s")
     return form, options.pop("watch", None)
 
 

@@ -9,7 +9,7 @@ from concurrent.futures import CancelledError, Future
 from concurrent.futures import TimeoutError as TooLate
 from typing import Final
 
-from detent.cell.breakage import Fault, OnLine, StuckPin, StuckSwitch, SupplyDip, WriteFailure, find_pin
+from detent.cell.breakage import Fault, OnLine, StuckPin, StuckSwitch, SupplyDip, WriteFailure
 from detent.cell.deeds import Action
 from detent.lines.faults import BitErrors, CableOut, Delay, LineFault, LostCharacters
 from detent.pins import LOW
@@ -295,9 +295,7 @@ class Control:
         if "pin" in given:
             name, text = self._pin(given, outputs=True)
             level = given.get("level", LOW)
-            pin = find_pin(cell.parts[cell.unit(name)].pins, text)
-            assert pin is not None
-            conditions.append(Condition(lambda: level_of(self._service, name, pin) == level))
+            conditions.append(Condition(lambda: level_of(self._service, name, text) == level))
         elif "level" in given:
             raise AskedWrongly("wait: a level of what", "name the pin too")
         if isinstance(time := given.get("time"), int):
@@ -348,9 +346,8 @@ class Control:
         standing = list(self._cell.faults.standing)
         if number is None:
             numbers = standing
-        elif number in standing:
-            assert isinstance(number, int)
-            numbers = [number]
+        elif isinstance(number, int) and self._cell.faults.known(number):
+            numbers = [one for one in standing if one == number]  # it may be over already
         else:
             raise verbs.unknown("fault", str(number), [str(known) for known in standing])
         for one in numbers:
@@ -381,6 +378,8 @@ class Control:
         axes = self._cell.controller(unit).axes
         axis = given.get("axis", axes[0])
         if axis not in axes:
+            if len(axes) == 1:
+                raise AskedWrongly(f"{unit} has no axis {str(axis)!r}", "it has only one: leave the axis out")
             raise verbs.unknown(f"axis of {unit}", str(axis), axes)
         return str(axis)
 

@@ -61,7 +61,13 @@ def find(address: Address, passes: list[Pass], watch: Watch | None = None) -> li
 def search_at(port: FormattedPort, passes: list[Pass], watch: Watch | None = None) -> list[Found]:
     """The same at an open port, or at the line of a cell."""
     # its steps are those of an operation, and `Tune`
-    return _Searcher(Driver(), port, watch).perform(cast("Steps[list[Found]]", search(passes)))
+    return _Searcher(_Nobody(), port, watch).perform(cast("Steps[list[Found]]", search(passes)))
+
+
+class _Nobody(Driver):
+    """Who it is that answers is not known yet."""
+
+    title = "a search"
 
 
 class _Searcher(Blocking):

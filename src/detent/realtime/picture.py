@@ -8,7 +8,7 @@ from detent.cell.cell import Cell
 from detent.cell.mechanics import Mechanics
 from detent.cell.switches import Switch
 from detent.controllers.device import Powered, Refused
-from detent.pins import Level, Pin, PinKind
+from detent.pins import Level, Pin
 from detent.realtime.service import Service
 from detent.realtime.verbs import Answer, Json
 from detent.realtime.watch import Event, Watch
@@ -45,31 +45,27 @@ def unit_state(service: Service, name: str) -> Answer:
     cell, watch = service.cell, _watch(service)
     index = cell.unit(name)
     seen = watch.of_unit[index]
+    front = seen.front
     found: Answer = {
         "model": service.description.units[name].model,
         "powered": cell.supplied(index),
-        "pins": {
-            pin.name: level_of(service, name, pin)
-            for pin in cell.parts[index].pins
-            if pin.kind.drives or pin.kind.reads
-        },
+        "pins": {pin.name: front.levels[pin.name] for pin in _pins(cell, index)},
         "received": seen.received,
         "sent": seen.sent,
         "said": bytes(value & 0xFF for value in seen.said).decode("latin-1"),
-        "refused": None if seen.refused is None else as_json(seen.refused),
+        "refused": None if front.refused is None else as_json(front.refused),
     }
     if name not in cell.controllers():
         return found
     controller = cell.controller(name)
     axes: dict[str, Json] = {}
-    for axis in controller.axes:
-        status, motion = controller.status(cell.now, axis), seen.motions.get(axis)
-        rate = 0.0 if motion is None else motion.direction * motion.train.state_at(cell.now).rate
+    for axis, travel in front.travels.items():
+        status, (_, rate) = controller.status(cell.now, axis), travel.at(cell.now)
         axes[axis] = {"position": status.position, "pulses": status.pulses, "rate": rate, "state": status.state}
     return found | {
         "state": controller.status(cell.now).state,
         "axes": axes,
-        "executing": None if seen.executing is None else as_json(seen.executing),
+        "executing": None if front.executing is None else as_json(front.executing),
         "image_bytes": len(controller.kept_memory()),
     }
 
@@ -80,28 +76,18 @@ def pins_of(service: Service, name: str) -> dict[str, dict[str, Json]]:
     index, stuck = cell.unit(name), {f.pin for f in _faults(cell, StuckPin) if f.unit == name}
     return {
         pin.name: {
-            "level": level_of(service, name, pin),
+            "level": level_of(service, name, pin.name),
             "kind": pin.kind.value,
             "wired": (cell.net_driven if pin.kind.drives else cell.net_read)(index, pin.name) is not None,
             "stuck": pin.name in stuck,
         }
-        for pin in cell.parts[index].pins
-        if pin.kind.drives or pin.kind.reads
+        for pin in _pins(cell, index)
     }
 
 
-def level_of(service: Service, name: str, pin: Pin) -> Level | None:
+def level_of(service: Service, name: str, pin: str) -> Level | None:
     """The level of a pin of a unit; None where an output is let go, or nobody has asked."""
-    cell = service.cell
-    index = cell.unit(name)
-    seen = _watch(service).of_unit[index]
-    if pin.kind.drives:
-        return seen.outputs.get(pin.name)
-    if pin.name in seen.inputs:
-        return seen.inputs[pin.name]
-    if (net := cell.net_read(index, pin.name)) is not None:
-        return cell.nets[net].level
-    return pin.rest if pin.kind is PinKind.INPUT else service.straps[name].get(pin.name, pin.rest)
+    return _watch(service).of_unit[service.cell.unit(name)].front.levels[pin]
 
 
 def switches_of(service: Service) -> dict[str, Json]:
@@ -135,6 +121,11 @@ def _value(value: object) -> Json:
         return [_value(item) for item in value]
     assert value is None or isinstance(value, (str, int, float, bool))
     return value
+
+
+def _pins(cell: Cell, unit: int) -> list[Pin]:
+    """The inputs, straps and outputs of a unit."""
+    return [pin for pin in cell.parts[unit].pins if pin.kind.drives or pin.kind.reads]
 
 
 def _watch(service: Service) -> Watch:

@@ -15,7 +15,7 @@ import time
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Protocol, TypedDict
 
-from detent.realtime.addresses import CONNECT_SECONDS, Address, port_error
+from detent.realtime.addresses import CLOSED, CONNECT_SECONDS, Address, port_error
 from detent.ticks import SECOND
 from detent.uart import Format
 
@@ -176,6 +176,8 @@ class _Descriptor:
     in half the time, and a device that takes nothing for a long time is an error and no endless wait.
     """
 
+    kind = "device"
+
     def __init__(self, descriptor: int) -> None:
         os.set_blocking(descriptor, False)
         self._descriptor = descriptor
@@ -191,7 +193,7 @@ class _Descriptor:
         except BlockingIOError:
             return b""
         if not data:
-            raise OSError(errno.EIO, "the other end closed it, or it was unplugged")
+            raise OSError(errno.EIO, CLOSED[self.kind])
         return data
 
     def write(self, data: bytes) -> None:
@@ -227,6 +229,8 @@ class _Tcp(_Descriptor):
     Not through serialx, whose sockets keep Nagle's algorithm: a frame written in two parts then is answered after
     40 ms and not after 40 us, on one computer.
     """
+
+    kind = "tcp"
 
     def __init__(self, address: Address) -> None:
         host, port = address.tcp

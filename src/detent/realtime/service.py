@@ -8,11 +8,10 @@ from fractions import Fraction
 from typing import NamedTuple, TypeVar
 
 from detent.cell.build import build
-from detent.cell.cell import Cell, Store, no_store
+from detent.cell.cell import Cell
+from detent.cell.delivery import Store, no_store
 from detent.cell.description import Description, Problem
 from detent.cell.mechanics import Mechanics
-from detent.controllers import catalogue
-from detent.pins import Level
 from detent.realtime.endpoints.endpoint import Endpoint
 from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.images import Images
@@ -59,7 +58,6 @@ class Service:
             line_timing = False  # the wire outside takes the time
         self.cell = build_with_images(description, read, images, line_timing, self.reports, observed)
         self.watch = _watch(self.cell) if observed else None
-        self.straps = strap_levels(description) if observed else {}
         self._company = contextlib.ExitStack()
         self._cleanup = contextlib.ExitStack()
         with contextlib.ExitStack() as opening:
@@ -141,27 +139,9 @@ def models(description: Description) -> dict[str, str]:
     return {name: unit.model for name, unit in description.units.items()}
 
 
-def strap_levels(description: Description) -> dict[str, dict[str, Level]]:
-    """The straps of every controller as they are read, those of a line completed line by line."""
-    found: dict[str, dict[str, Level]] = {}
-    alone = [[name] for name in description.units if not description.lines]
-    for units in [line.units for line in description.lines.values()] + alone:
-        models = [catalogue.MODELS.get(description.units[unit].model) for unit in units]
-        if models[0] is None or None in models:
-            continue  # a part without straps
-        named = [
-            (unit, {pin: catalogue.strap_level(models[0], pin, level) for pin, level in straps.items()})
-            for unit in units
-            for straps in [description.units[unit].straps]
-        ]
-        found |= dict(zip(units, models[0].strap_line(named), strict=True))
-    return found
-
-
 def _watch(cell: Cell) -> Watch:
     """A watch in the place of the recording of `cell`. The past is not kept, and of the journal what is recent."""
-    assert cell.recording is not None
-    watch = Watch(cell.recording.units, cell.recording)
+    watch = Watch(cell)
     cell.recording, cell.journal = watch, Lately()
     for part in cell.parts:
         if isinstance(part, Mechanics):

@@ -8,7 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Final, NamedTuple, TypeAlias
 
-from detent.ticks import parse_duration
+from detent.ticks import SECOND, parse_duration
+
+LONGEST_WAIT: Final = 24 * 3600 * SECOND  # clocks of operating systems do not count as far as ours
 
 Json: TypeAlias = "str | int | float | bool | Sequence[Json] | Mapping[str, Json] | None"
 Answer: TypeAlias = dict[str, Json]
@@ -88,6 +90,12 @@ def _time(value: object) -> int:
     return parse_duration(value)
 
 
+def _patience(value: object) -> int:
+    if (patience := _time(value)) > LONGEST_WAIT:
+        raise ValueError(value)
+    return patience
+
+
 def _pace(value: object) -> float | None:
     return None if value is None or str(value).strip().lower() in ("free", "null", "none") else _number(value)
 
@@ -99,6 +107,7 @@ NUMBER: Final = Kind("a number", _number)
 LEVEL: Final = Kind("0, 1, low or high", _level)
 FLAG: Final = Kind("true or false", _flag)
 TIME: Final = Kind('seconds, or a time like "20 ms"', _time)
+PATIENCE: Final = Kind('seconds, at most a day of them, or a time like "20 ms"', _patience)
 PACE: Final = Kind('a number above 0, or "free"', _pace)
 
 
@@ -137,13 +146,15 @@ class Verb(NamedTuple):
                 raise AskedWrongly(f"{self.name}: {name} cannot be {value!r}", f"it takes {kind.takes}") from None
         for parameter in self.parameters:
             if parameter.required and parameter.name not in found:
-                raise AskedWrongly(f"{self.name}: {parameter.name} is missing", f"it is {parameter.help}")
+                raise AskedWrongly(
+                    f"{self.name}: {parameter.name} is missing", f"it takes {parameter.kind.takes}: {parameter.help}"
+                )
         return found
 
 
 UNIT: Final = Parameter("unit", TEXT, "a unit; may be left out where there is only one")
 PIN: Final = Parameter("pin", TEXT, "UNIT.PIN, or PIN where there is only one unit", True)
-TIMEOUT: Final = Parameter("timeout", TIME, "of the wall clock; 60 s unless it is said otherwise")
+TIMEOUT: Final = Parameter("timeout", PATIENCE, "of the wall clock; 60 s unless it is said otherwise")
 SEED: Final = Parameter("seed", COUNT, "another seed strikes other characters; 0 unless it is said otherwise")
 
 VERBS: Final[Mapping[str, Verb]] = {
@@ -196,7 +207,7 @@ VERBS: Final[Mapping[str, Verb]] = {
               Parameter("level", LEVEL, "where a switch or an input is stuck"),
               Parameter("times", NATURAL, "how many writes fail; all without it"),
               SEED), placed=2),
-        Verb("mend", "A fault is mended; all of them without a number.",
+        Verb("mend", "A fault is mended, if it is not over already; all of them without a number.",
              (Parameter("fault", NATURAL, "its number"),)),
     )
 }  # fmt: skip

@@ -108,13 +108,13 @@ class Watched:
 
 def at_position(cell: Cell, watch: Watch, unit: str, axis: str, position: int) -> Condition:
     """The axis of a unit is at a position. The pulse that brings it there is an instant to look at."""
-    controller, watched = cell.controller(unit), watch.of_unit[cell.unit(unit)]
+    controller, travel = cell.controller(unit), watch.of_unit[cell.unit(unit)].front.travels[axis]
 
     def holds() -> bool:
         return controller.status(cell.now, axis).position == position
 
     def following() -> Ns:
-        motion = watched.motions.get(axis)
+        motion = travel.motion
         if motion is None:
             return NEVER
         missing = (position - controller.status(cell.now, axis).position) * motion.direction

@@ -5,13 +5,13 @@ grow, however long the cell is served.
 """
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Final, TypeVar
 
-from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.recording import Entry, InputSet, Log, Received, Recording
-from detent.controllers.device import Executing, Finished, Powered, Refused, StoreImage
-from detent.pins import Level, PinSet
+from detent.cell.cell import Cell
+from detent.cell.panel import Front, Panel
+from detent.cell.recording import Entry, Log, Received, Recording
+from detent.controllers.device import Executing, Powered, Refused, StoreImage
 from detent.uart import Sent
 
 MOST_EVENTS: Final = 200  # kept
@@ -24,16 +24,12 @@ T = TypeVar("T")
 
 
 class UnitWatch:
-    """How one unit stands, as far as it has told."""
+    """How one unit stands: its panel, and what went over its line."""
 
-    __slots__ = ("executing", "inputs", "motions", "outputs", "received", "refused", "said", "sent")
+    __slots__ = ("front", "received", "said", "sent")
 
-    def __init__(self) -> None:
-        self.outputs: dict[str, Level] = {}  # driven ones
-        self.inputs: dict[str, Level] = {}  # what they were given last
-        self.motions: dict[str, MotionStarted] = {}  # in force, by axis
-        self.executing: Executing | None = None
-        self.refused: Refused | None = None
+    def __init__(self, front: Front) -> None:
+        self.front = front
         self.received = 0  # characters, whether it understood them or not
         self.sent = 0
         self.said: deque[int] = deque(maxlen=MOST_SAID)
@@ -41,46 +37,29 @@ class UnitWatch:
     def tell(self, entry: Entry) -> bool:
         """It did this, or this was done to it; whether it is an event worth keeping."""
         match entry:
-            case PinSet(_, pin, level):
-                self.outputs[pin] = level
-            case InputSet(_, pin, level):
-                self.inputs[pin] = level
             case Sent():
                 self.sent += 1
                 self.said.append(entry.char.value)
             case Received():
                 self.received += 1
-            case Executing():
-                self.executing = entry
-            case Finished():
-                self.executing = None
-            case MotionStarted():
-                self.motions[entry.axis] = entry
-            case MotionCut() | MotionEnded():
-                self.motions.pop(entry.axis, None)
-            case Refused():
-                self.refused = entry
-                return True
-            case StoreImage():
-                return True
-            case Powered(_, on):
-                self.executing = None
-                if not on:
-                    self.outputs.clear()
-                return True
+            case _:
+                return self.front.take(entry) and not isinstance(entry, Executing)
         return False
 
 
 class Watch(Recording):
-    """How each unit of a cell stands. `before` is what was recorded until now; it is not kept."""
+    """How each unit of `cell` stands. It goes on from the recording of the cell, of which it keeps nothing else."""
 
     __slots__ = ("events", "of_unit")
 
-    def __init__(self, units: Sequence[str], before: Iterable[tuple[int, Entry]] = ()) -> None:
-        super().__init__(units)
-        self.of_unit = [UnitWatch() for _ in units]
+    def __init__(self, cell: Cell) -> None:
+        """ValueError for a cell that does not record."""
+        if cell.recording is None:
+            raise ValueError("this cell keeps no recording to go on from: build it with record=True")
+        super().__init__(cell.recording.units)
+        self.of_unit = [UnitWatch(front) for front in Panel(cell, {}).fronts]
         self.events: deque[tuple[int, Event]] = deque(maxlen=MOST_EVENTS)  # the unit, and what it was
-        for unit, entry in before:
+        for unit, entry in cell.recording:
             self.extend(unit, (entry,))
 
     def extend(self, unit: int, entries: Sequence[Entry]) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Final
 from detent.cell.description import Description, Problem, parse, single
 from detent.controllers import catalogue
 from detent.realtime import verbs
-from detent.realtime.control import Control
+from detent.realtime.control import PATIENCE, Control
 from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.images import Images, cell_name
 from detent.realtime.service import Service, models
@@ -89,7 +89,9 @@ class Served:
         for number, found, address in service.addresses():
             if (number, found) == (line, kind):
                 return address
-        raise AskedWrongly(f"{self.unit} has no {kind}", "its line is behind an adapter, or it was served without")
+        raise AskedWrongly(
+            f"{self.unit} has no {kind}", "serve it with tcp=True, or ask for the unit in front of its line"
+        )
 
     # -- verbs -------------------------------------------------------------------------------------------
 
@@ -105,8 +107,11 @@ class Served:
 
     def position(self, axis: str | None = None) -> int:
         """Where an axis is, the first unless it is named."""
-        axes: dict[str, Any] = self.state()["axes"]
-        found = next(iter(axes.values())) if axis is None else axes[axis]
+        axes: dict[str, Any] = self.state().get("axes", {})
+        found = next(iter(axes.values()), None) if axis is None else axes.get(axis)
+        if found is None:
+            known = "leave the axis out" if len(axes) == 1 else f"there are: {', '.join(axes) or 'none'}"
+            raise AskedWrongly(f"{self.unit} has no axis {axis or ''!r}", known)
         return int(found["position"])
 
     def wait(self, **conditions: object) -> Answer:
@@ -129,7 +134,7 @@ class Served:
         return number
 
     def mend(self, fault: int | None = None) -> None:
-        """A fault is mended; all faults of the cell without a number."""
+        """A fault is mended, if it is not over already; all faults of the cell without a number."""
         self.do("mend", **({} if fault is None else {"fault": fault}))
 
     def type(self, text: str) -> None:
@@ -160,9 +165,13 @@ class Served:
         """Let the cell time go on."""
         self.do("resume")
 
-    def run_for(self, time: str | float) -> None:
-        """Let the cell go on for so long, then stand."""
-        self.do("run-for", time=time)
+    def run_for(self, time: str | float, timeout: float = PATIENCE) -> None:
+        """Let the cell go on for so long, then stand. Raises TimeoutError where that takes longer than `timeout`.
+
+        `time` is of the cell, `timeout` seconds of the wall clock.
+        """
+        if not self.do("run-for", time=time, timeout=timeout)["reached"]:
+            raise TimeoutError(f"{self.unit} has not run for {time} within {timeout} s of the wall clock")
 
     def pace(self, factor: float | None) -> None:
         """So many times as fast as real time; None: as fast as it can."""
@@ -209,7 +218,8 @@ class Bench:
     ) -> Served:
         """Serve a model by name, or a cell file. Straps, options and program are those of a model.
 
-        `pace` None: as fast as it can. Raises `detent.cell.description.Problem`, with the remedy.
+        `pace` None: as fast as it can. Raises ValueError with the remedy: `detent.cell.description.Problem` for what
+        is wrong with a cell file, `CatalogueError` for a model that there is not.
         """
         description = self._description(str(target), straps, options, program)
         name = cell_name(str(target), is_file=bool(description.file))

@@ -25,6 +25,7 @@ PACES: Sequence[float | None] = (0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.
 """The notches of the pace, times real time; None: as fast as it goes."""
 
 LevelField = Annotated[Level, Field(ge=0, le=1)]
+PlaceField = Annotated[float, Field(allow_inf_nan=False)]
 Text = Annotated[str, Field(max_length=4096)]
 
 
@@ -101,7 +102,7 @@ def _unit(values: dict[str, Value], key: str, unit: UnitState) -> None:
 def _offer(bench: "Bench", live: Live) -> None:
     """What a window may do to the cell."""
 
-    async def pace(times: Annotated[float, Field(gt=0, le=1e6)] | None) -> None:
+    async def pace(times: Annotated[float, Field(ge=1e-6, le=1e6)] | None) -> None:
         await bench.pace(times)
 
     async def notch(by: int) -> None:
@@ -139,11 +140,14 @@ def _offer(bench: "Bench", live: Live) -> None:
     async def set_strap(unit: str, pin: str, level: LevelField) -> None:
         await bench.set_strap(unit, pin, level)
 
-    async def place_switch(name: str, low: float | None, high: float | None) -> None:
+    async def place_switch(name: str, low: PlaceField | None, high: PlaceField | None) -> None:
         await bench.place_switch(name, low, high)
 
     async def send(line: str, data: Text) -> None:
         """`data` has one character a byte."""
+        foreign = next((character for character in data if ord(character) > 0xFF), None)
+        if foreign is not None:
+            raise ValueError(f"{foreign!r} is no byte: write what cannot be typed as \\xHH")
         await bench.send(line, data.encode("latin-1"))
 
     async def type(unit: str, text: Text) -> None:

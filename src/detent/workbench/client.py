@@ -446,9 +446,9 @@ class Bench:
 
     async def export(self, kind: str, begin: Ns | None = None, end: Ns | None = None,
                      traces: Sequence[str] = ()) -> bytes:  # fmt: skip
-        """What happened as a file: vcd, sr, npz (everything), csv (rows of least and most), png (a figure).
+        """What happened as a file: vcd, sr, npz (everything), csv (rows of least and most).
 
-        Traces (keys) and times are for csv and png; without them all axes, from the beginning of the history to its
+        Traces (keys) and times are for csv; without them all axes, from the beginning of the history to its
         end. Raises BenchError for an unknown kind, and where the format cannot hold it.
         """
         if kind not in exports.KINDS:
@@ -462,9 +462,7 @@ class Bench:
             chosen = [trace for trace in self.traces if trace.key in traces or (not traces and not trace.digital)]
             if not chosen:
                 raise BenchError("there is no such trace to export")
-            if kind == "csv":
-                return exports.table(self._scope, chosen, first, last)
-            return exports.figure(self._scope, chosen, first, last, self.picture.title or self.picture.target)
+            return exports.table(self._scope, chosen, first, last)
         except (ValueError, OSError) as error:
             raise BenchError(str(error)) from error
 

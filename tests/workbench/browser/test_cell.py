@@ -85,6 +85,23 @@ def test_pause_single_events_back_and_on_by_keys(window: Window) -> None:
     window.until("(stood) => !detent.get('held') && detent.get('now') > stood", stood)
 
 
+def test_the_keys_of_time_act_at_the_time_line_too(window: Window) -> None:
+    window.until("() => detent.get('now') > 3e8")
+    line = window.page.get_by_role("slider", name="Time line")
+    line.press(" ")
+    window.until("() => detent.get('held')")
+    stood = window.get("now")
+    line.press(",")
+    window.until("(stood) => detent.get('now') < stood", stood)
+    before = window.get("now")
+    line.press(".")
+    window.until("(before) => detent.get('now') > before", before)
+    line.press("]")
+    window.until("() => detent.get('pace') === 2")
+    line.press(" ")
+    window.until("() => !detent.get('held')")
+
+
 def test_the_pace_goes_from_a_hundredth_to_as_fast_as_it_goes(window: Window) -> None:
     pace = window.page.get_by_role("combobox", name="Pace")
     pace.select_option("0.01")

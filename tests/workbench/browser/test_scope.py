@@ -156,6 +156,8 @@ def test_two_cursors_show_times_and_values_with_their_differences(scope: Window)
     strip = scope.page.locator(".scope-strip").inner_text()
     assert "\u0394t" in strip
     assert "Hz" in strip
+    scope.page.get_by_role("button", name="Show everything since the beginning").click()
+    scope.until(f"() => {SCOPE}.view.begin < {SCOPE}.cursors[0]")
     scope.picture("scope-cursors")
     before = value(scope, "cursors[1]")
     width = value(scope, "plot.width")
@@ -268,7 +270,8 @@ def test_two_fingers_zoom_on_a_phone(windows: Windows, workbench: Served) -> Non
     held_at(window, 3)
     box = window.page.locator(".scope canvas").bounding_box()
     session = window.page.context.new_cdp_session(window.page)
-    y = box["y"] + 200
+    lane = value(window, "plot.lanes[0]")
+    y = box["y"] + lane["top"] + 0.8 * lane["height"]  # below its label, in which there is a button
 
     def touch(kind: str, *places: float) -> None:
         points = [{"x": box["x"] + x, "y": y, "id": k} for k, x in enumerate(places)]

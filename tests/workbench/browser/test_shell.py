@@ -151,6 +151,55 @@ def test_a_switch_is_dragged_along_the_axis_and_moved_by_keys(guarded: Window) -
     guarded.until("(there) => detent.get('s.sensor.low') === there + 1", there)
 
 
+def test_what_is_no_byte_no_place_and_no_pace_is_refused_and_harms_nothing(guarded: Window) -> None:
+    refused = """(call) => new Promise((told) => {  // numbers as only a hand-made call has them
+        const socket = new WebSocket(`ws://${location.host}/live`);
+        socket.onopen = () => socket.send(`{"id": 1, ${call}}`);
+        socket.onmessage = ({ data }) => { const one = JSON.parse(data); if (one.id) told(one.error), socket.close(); };
+    })"""
+    for call, why in (
+        ('"call": "send", "args": ["slide", "\\u20ac"]', "is no byte"),
+        ('"call": "place_switch", "args": ["home", NaN, 0]', "finite number"),
+        ('"call": "place_switch", "args": ["home", -Infinity, 0]', "finite number"),
+        ('"call": "pace", "args": [1e-300]', "greater than"),
+    ):
+        assert why in guarded.page.evaluate(refused, call)
+    assert guarded.get("crashed") is None
+
+
+def test_where_a_unit_is_the_host_of_a_line_no_command_is_offered(
+    windows: Windows, serve: Callable[..., Served]
+) -> None:
+    window = windows.new(serve(str(HOMING.parents[1] / "xyz-party-line" / "cell.toml"))).open()
+    assert window.page.get_by_label("Command to adapter").is_visible()
+    assert window.page.get_by_label("Command to x", exact=True).count() == 0
+    assert window.page.get_by_role("region", name="Unit x").get_by_text("adapter is the host").is_visible()
+    assert window.page.get_by_role("switch", name="Power of adapter").count() == 0  # nothing tells of its supply
+    window.page.get_by_role("link", name="Terminal", exact=True).click()
+    window.page.get_by_role("tab", name="bus").click()
+    field = window.page.get_by_role("combobox", name="Line to send")
+    assert field.is_disabled()
+    assert "send to adapter" in (field.get_attribute("placeholder") or "")
+    assert window.page.get_by_role("button", name="Run").is_disabled()
+    window.page.get_by_role("tab", name="computer").click()
+    assert field.is_enabled()
+
+
+def test_on_a_phone_the_pause_is_explained_and_the_alarm_fits(windows: Windows, serve: Callable[..., Served]) -> None:
+    phone = windows.new(serve(str(HOMING), "--token", "a word of my own"), size=PHONE)
+    phone.page.goto(phone.url)
+    phone.until("() => window.detent && detent.get('now') !== undefined")
+    phone.call("rewind", 0)
+    phone.page.locator(".why").get_by_text("by hand").wait_for()
+    phone.page.evaluate("document.documentElement.dataset.crashed = 'yes'")
+    alarm = phone.page.get_by_role("alert").first.bounding_box()
+    button = phone.page.get_by_role("button", name="Start the cell again").bounding_box()
+    assert alarm is not None
+    assert button is not None
+    assert button["x"] + button["width"] <= alarm["x"] + alarm["width"] <= PHONE[0]
+    phone.call("go")
+
+
 def test_a_crash_of_the_cell_is_told_loses_no_draft_and_is_mended_with_a_click(guarded: Window) -> None:
     guarded.call("keep_draft", "slide", "+250 ; not yet loaded\n", "")
     children = Path(f"/proc/{guarded.process}/task/{guarded.process}/children").read_text().split()

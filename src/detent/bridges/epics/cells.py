@@ -10,7 +10,6 @@ from detent.controllers.gsc200 import pins as gsc200_pins
 from detent.hosts.genstepper.dialogue import MOTORS
 from detent.pins import HIGH, Level
 from detent.realtime.connect import HOSTS
-from detent.realtime.service import strap_levels
 from detent.uart import Format
 
 
@@ -26,7 +25,7 @@ class CellAxis(NamedTuple):
 
 def axes(description: Description, cell: Cell) -> list[CellAxis]:
     """Every axis that a host outside can drive, in file order. Raises Problem if there is none."""
-    straps = strap_levels(description)
+    controllers = cell.controllers()
     found = []
     for unit, entry in description.units.items():
         if entry.model not in HOSTS:
@@ -36,7 +35,7 @@ def axes(description: Description, cell: Cell) -> list[CellAxis]:
         number = cell.wiring.line_of[cell.unit(adapter or unit)]
         if number < 0:
             continue
-        given = _options(description, unit, straps.get(unit, {}))
+        given = _options(description, unit, controllers[unit].straps)
         found += [
             CellAxis(f"{unit} {motor}" if motor else unit, entry.model, {**given, **more}, number,
                      cell.lines[number].format)

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextvars import ContextVar
 from typing import Any
 
-from caproto import AlarmSeverity, AlarmStatus, CAStatus, SkipWrite
+from caproto import AlarmSeverity, AlarmStatus, CaprotoRuntimeError, CAStatus, SkipWrite
 from caproto.asyncio.server import Context
 from caproto.server import PVGroup, pvproperty
 
@@ -98,7 +98,10 @@ def _told_whether_it_failed(write: Callable[..., Awaitable[Any]]) -> Callable[..
 
 
 async def serve(motors: Sequence[ServedMotor], interfaces: Sequence[str] | None, ready: Callable[[int], None]) -> None:
-    """Serve records that have begun until cancelled; `ready` is told the port once clients can connect."""
+    """Serve records that have begun until cancelled; `ready` is told the port once clients can connect.
+
+    Raises OSError where it cannot listen.
+    """
     pvs = {name: pv for motor in motors for name, pv in motor.pvs.items()}
     context = Context(pvs, list(interfaces) if interfaces else None)
     watching: list[asyncio.Task[None]] = []
@@ -109,6 +112,8 @@ async def serve(motors: Sequence[ServedMotor], interfaces: Sequence[str] | None,
 
     try:
         await context.run(startup_hook=started)
+    except CaprotoRuntimeError as error:
+        raise OSError(str(error)) from error
     finally:
         for task in watching:
             task.cancel()

@@ -232,8 +232,19 @@ class GsC200(Commands):
         return kept
 
     def _recalled(self) -> Steps[list[str]]:
-        """The program of the EEPROM, which is in RAM, too, afterwards."""
-        yield from self.recall()
+        """The program of the EEPROM, which is in RAM, too, afterwards.
+
+        X is refused in programming mode, in which whoever was interrupted may have left the module.
+        """
+        try:
+            yield from self.recall()
+        except Refused as error:
+            if error.code != "E4":
+                raise
+            if not self.signed:
+                raise Refused(self.title, f"does not obey X now: {LEAVING}", error.spoken, error.code) from error
+            yield from self.leave_programming()
+            yield from self.recall()
         return (yield from self.read_program())
 
     @operation
@@ -251,7 +262,9 @@ class GsC200(Commands):
         old = f"The EEPROM held {_listing(kept or [])}"
         if kept == program and ram in (None, held):
             told = ["The EEPROM holds this program already: nothing was written to it."]
-            if held not in ([], kept) and not self.signed:
+            if held not in ([], kept) and ram is None:
+                if self.signed:  # it had been given back
+                    yield from self._recalled()
                 told.append(f"The RAM held {_listing(held)}, and now holds that of the EEPROM.")
             return told
         if kept != program:

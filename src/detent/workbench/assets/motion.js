@@ -92,7 +92,7 @@ class Motion {
       const exact = wide
         ? (row.low + shift) * ((row.high + shift) / (row.low + shift)) ** (at / NOTCHES) - shift
         : row.low + (at / NOTCHES) * (row.high - row.low);
-      const size = wide ? 10 ** Math.max(Math.floor(Math.log10(Math.max(exact, 1))) - 1, 0) : 1; // two figures are enough for a hand
+      const size = wide ? 10 ** Math.max(Math.floor(Math.log10(Math.max(exact, 1))) - 1, 0) : 1; // two figures will do
       return Math.min(Math.max(Math.round(exact / size) * size, row.low), row.high);
     };
     const range = element("input", {
@@ -325,7 +325,7 @@ class Motion {
     place.dataset.kind = kind;
   }
 
-  /* -- keys --------------------------------------------------------------------------------------------------------- */
+  /* -- keys ---------------------------------------------------------------------------------------------------- */
 
   get deeds() {
     const tell = (text) => {

@@ -81,7 +81,9 @@ class Program {
     this.root.classList.toggle("no-language", !facts.language);
     this.root.querySelector("[data-key=keep]").hidden = this.root.querySelector("[data-key=compare-kept]").hidden =
       !facts.nonvolatile;
-    this.at.why.textContent = `A ${facts.model} holds no programs. Write lines to send to it instead: “@ 500 ms” is a pause, “@ answer” waits for an answer.`;
+    this.at.why.textContent =
+      `A ${facts.model} holds no programs. Write lines to send to it instead: ` +
+      "\u201c@ 500 ms\u201d is a pause, \u201c@ answer\u201d waits for an answer.";
     this.file = draft ? draft.file : "";
     this.saved = this.file ? null : facts.source; // of a file that has not been read it is not known
     this.checked = null;

@@ -2,7 +2,8 @@
 
    A frame is binary: the length of a header (uint32, little-endian), the header (JSON), zeros up to a multiple of 8,
    and behind each other for each trace the low and the high values of its columns (float32, what they are more than the
-   trace's `base`). The header has begin and width of the columns in ns, and their count. The server sends the next frame when the page has acknowledged the last. */
+   trace's `base`). The header has begin and width of the columns in ns, and their count. The server sends the
+   next frame when the page has acknowledged the last. */
 
 export class Feed {
   constructor(url, { onFrame, onNews, onFile, onState }) {

@@ -1,9 +1,9 @@
 /* The plot of the scope: lanes of traces over one time axis, painted on a canvas.
 
    It knows no server and no hands. Times are ns of the cell as numbers (exact to 2^53 ns, 104 days); a view is
-   {begin, end}; a frame is what the feed sent (see scope_feed.js): columns, of each the least and the greatest value, so
-   that no pulse is lost; NaN is a gap. A trace has one of two shapes: "line" runs straight from column to column, "step"
-   holds its value. */
+   {begin, end}; a frame is what the feed sent (see scope_feed.js): columns, of each the least and the greatest value,
+   so that no pulse is lost; NaN is a gap. A trace has one of two shapes: "line" runs straight from column to column,
+   "step" holds its value. */
 
 const LEVEL_HEIGHT = 34,
   LEAST_HEIGHT = 84; // of lanes, px

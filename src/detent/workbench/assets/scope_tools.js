@@ -1,6 +1,7 @@
 /* The tools around the scope's plot: buttons, the labels of the lanes, the choice of traces, the trigger, the export.
 
-   They are built from the catalogue of traces that the feed sends: {id, unit, name, title, lane, shape, level, units}. */
+   They are built from the catalogue of traces that the feed sends:
+   {id, unit, name, title, lane, shape, level, units}. */
 
 import { showNumber, showRate, showSpan, showTime } from "./scope_plot.js";
 
@@ -43,7 +44,7 @@ export class Tools {
         this.followKey,
         key("\u2212", "Show more time", () => scope.hands.zoom(1.6)),
         key("+", "Show less time", () => scope.hands.zoom(1 / 1.6)),
-        key("All", "Show everything since the begin", () => scope.fit()),
+        key("All", "Show everything since the beginning", () => scope.fit()),
         this.cursorKey,
         this.span,
       ),

@@ -31,6 +31,7 @@ part("terminal", (box) => {
   let seen = null;
   let timer = 0;
   let kept = 0;
+  let unkept = null; // a draft that is kept soon
   let said = [];
   let back = 0;
 
@@ -117,18 +118,22 @@ part("terminal", (box) => {
   }
 
   function choose(name) {
+    keepNow();
     line = name;
     remember("line", name);
     for (const tab of box.querySelectorAll("[data-line]")) tab.setAttribute("aria-selected", tab.dataset.line === name ? "true" : "false");
     for (const end of box.querySelectorAll("[data-ends]")) end.hidden = end.dataset.ends !== name;
     to.replaceChildren(...facts[name].units.map((unit) => new Option(unit, unit)), new Option("bytes", RAW));
-    to.hidden = false;
+    const { host } = facts[name]; // a unit of the cell: nobody else may speak
+    for (const one of [to, text, role("say").querySelector("button"), script]) one.disabled = host !== null;
+    text.placeholder = host === null ? "Command" : `${host} is the host of this line: send to ${host}`;
     rows.replaceChildren();
     next = 0;
     cut = null;
     said = JSON.parse(remembered(`said.${name}`) || "[]");
     back = said.length;
     fillSaid();
+    hint();
     showScript();
     progress();
     look();
@@ -143,6 +148,7 @@ part("terminal", (box) => {
   function hint() {
     const here = role("hint");
     here.replaceChildren();
+    if (facts[line].host !== null) return;
     if (to.value === RAW) {
       here.textContent = "Bytes as they are: \\r, \\n, \\t and \\xHH stand for what cannot be typed.";
       return;
@@ -202,8 +208,11 @@ part("terminal", (box) => {
     const mine = line;
     script.value = role("file").value = "";
     renumber();
+    script.readOnly = true; // what is typed now the draft would overwrite
     const draft = await call("draft", draftName()).catch(() => null);
-    if (mine !== line || !draft) return;
+    if (mine !== line) return;
+    script.readOnly = false;
+    if (!draft) return;
     script.value = draft.text;
     role("file").value = draft.file;
     renumber();
@@ -222,13 +231,20 @@ part("terminal", (box) => {
   }
 
   function keep() {
+    unkept = [draftName(), script.value, role("file").value];
     clearTimeout(kept);
-    kept = setTimeout(() => call("keep_draft", draftName(), script.value, role("file").value).catch((error) => toast(error.message, "error")), 400);
+    kept = setTimeout(keepNow, 400);
+  }
+
+  function keepNow() {
+    clearTimeout(kept);
+    if (unkept) call("keep_draft", ...unkept).catch((error) => toast(error.message, "error"));
+    unkept = null;
   }
 
   function progress() {
     const how = get(`script.${line}`) || { running: false, line: 0, told: "" };
-    role("run").disabled = how.running;
+    role("run").disabled = how.running || facts[line].host !== null;
     role("stop").disabled = !how.running;
     const told = role("told");
     told.textContent = how.running ? `sending line ${how.line}` : how.told;
@@ -284,7 +300,6 @@ part("terminal", (box) => {
 
   const ends = [frame(soon), on("script.", progress)];
   choose(line);
-  hint();
   return () => {
     ends.forEach((end) => end());
     clearTimeout(timer);

@@ -186,10 +186,6 @@ part("timeline", (box) => {
     if (far) aim = (get("now") || 0) + far;
     else if (event.key === "Home") aim = begin();
     else if (event.key === "End") aim = end();
-    else if (event.key === " ") {
-      event.preventDefault();
-      call(get("held") ? "go" : "hold").catch((error) => toast(error.message, "error"));
-    }
     if (aim === null) return;
     event.preventDefault();
     wanted = Math.round(Math.max(begin(), Math.min(end(), aim)));

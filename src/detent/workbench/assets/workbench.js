@@ -211,7 +211,7 @@ let helpSoon = 0;
 
 function showHelp(element) {
   const text = element.dataset.help;
-  if (!text || !element.isConnected) return;
+  if (!text || !element.isConnected || document.querySelector(".tour")) return;
   if (!helpBox) {
     helpBox = document.createElement("div");
     helpBox.className = "help";
@@ -300,7 +300,7 @@ function listenForDeeds() {
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const at = event.target;
-    if (at.closest("input, textarea, select, [contenteditable], .cm-editor, [role=slider], [role=dialog]")) return;
+    if (at.closest("input, textarea, select, [contenteditable], .cm-editor, [role=dialog]")) return;
     const keys = { ".": "step_event", ",": "step_back", "[": "slower", "]": "faster" };
     if (event.key === " ") {
       if (at.closest("button, a, summary")) return; // it is theirs

@@ -72,11 +72,14 @@ def _unit(picture: Picture, unit: UnitPicture, jacks: set[str]) -> str:
     name, key = escape(unit.name), escape(f"u.{unit.name}")
     line = picture.lines.get(unit.line) if unit.line is not None else None
     axes = "".join(_axis(picture, unit, axis, jacks) for axis in unit.axes)
-    return f"""<section class="unit panel" data-unit="{name}" data-level="{key}.powered" aria-label="Unit {name}">
-<div class="panel-head"><button class="power" role="switch" data-do="power" data-pressed="{key}.powered"
+    power = f"""<button class="power" role="switch" data-do="power" data-pressed="{key}.powered"
  data-args="{_args(unit.name, f"!u.{unit.name}.powered")}" aria-label="Power of {name}"
- data-help="Power of {name}">{icon("power")}</button>
-<h2>{name}</h2><span class="quiet model" data-help="{escape(unit.title)}">{escape(unit.model)}</span>
+ data-help="Power of {name}">{icon("power")}</button>"""
+    if not unit.axes:
+        power = ""  # a part that moves nothing tells nothing of its supply
+    return f"""<section class="unit panel" data-unit="{name}" data-level="{key}.powered" aria-label="Unit {name}">
+<div class="panel-head">{power}<h2>{name}</h2>
+<span class="quiet model" data-help="{escape(unit.title)}">{escape(unit.model)}</span>
 <span class="state" data-live="{key}.state" data-level="{key}.state"></span></div>
 {axes}{_doing(unit)}{_pins(unit, jacks)}{_straps(unit)}{_foot(unit, line)}</section>"""
 
@@ -114,7 +117,7 @@ def _axis(picture: Picture, unit: UnitPicture, axis: str, jacks: set[str]) -> st
 <b data-live="{place}.rate" data-form="rate" data-help="Rate now"></b><small>steps/s</small>
 <b data-live="{place}.pulses" data-form="count" data-help="Step pulses given since the cell began"></b>
 <small>pulses</small></span>{_rotor(motor)}</div>"""
-    pins = _motor_pins(motor, jacks) if motor is not None else ""
+    pins = _motor_pins(picture, motor, jacks) if motor is not None else ""
     return f'<div class="axis">{dial}{readout}</div>{_slide(unit.name, axis, motor, switches)}{pins}'
 
 
@@ -160,13 +163,22 @@ def _slide(unit: str, axis: str, motor: MotorPicture | None, switches: Iterable[
     return f'<div class="slide" data-part="slide" data-facts="{escape(json.dumps(facts))}"></div>{contacts}'
 
 
-def _motor_pins(motor: MotorPicture, jacks: set[str]) -> str:
+def _motor_pins(picture: Picture, motor: MotorPicture, jacks: set[str]) -> str:
     """The pins of a motor to which wires lead. Their levels are those of the other end."""
     return "".join(
-        f"""<div class="contact" data-jack="{escape(end)}" data-side="left"><i class="jack"></i>
+        f"""<div class="contact" data-jack="{escape(end)}" data-side="left"
+ data-level="{escape(_other_end(picture, end))}"><i class="jack"></i>
 <span class="name">{escape(motor.name)}</span><span class="num">{escape(end.partition(".")[2])}</span></div>"""
         for end in sorted(jack for jack in jacks if jack.startswith(f"{motor.name}."))
     )
+
+
+def _other_end(picture: Picture, end: str) -> str:
+    """The key of the level at the other end of the wire to a motor's pin."""
+    wire = next(wire for wire in picture.wires if end in (wire.source, *wire.targets))
+    far = wire.targets[0] if end == wire.source else wire.source
+    unit, dot, pin = far.partition(".")
+    return f"u.{unit}.pin.{pin}" if dot else f"s.{unit}.level"
 
 
 def _pins(unit: UnitPicture, jacks: set[str]) -> str:
@@ -221,6 +233,10 @@ def _foot(unit: UnitPicture, line: LinePicture | None) -> str:
     if line is None:
         return ""
     name = escape(unit.name)
+    if line.host is not None:
+        return f"""<div class="foot"><span class="quiet where"><span data-live="l.{escape(line.name)}.format">
+{escape(line.format)}</span>
+<span>line {escape(line.name)}, on which {escape(line.host)} is the host</span></span></div>"""
     ends = "".join(
         f"""<button type="button" class="endpoint num" data-part="copy" data-copy="{escape(one.address)}"
  data-help="Where a host program connects to line {escape(line.name)}: click to copy">{escape(one.address)}</button>"""
@@ -243,7 +259,7 @@ def _loose_motor(picture: Picture, motor: MotorPicture, jacks: set[str]) -> str:
 <div class="axis">{_dial(f"m.{motor.name}.place", motor.steps, motor)}<div class="readout">
 <span class="first"><output data-live="m.{name}.command" data-form="steps"></output>
 <small>steps</small></span>{_rotor(motor)}</div></div>
-{_slide("", "", motor, switches)}{_motor_pins(motor, jacks)}</section>"""
+{_slide("", "", motor, switches)}{_motor_pins(picture, motor, jacks)}</section>"""
 
 
 def _args(*values: object) -> str:

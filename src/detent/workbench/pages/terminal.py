@@ -80,7 +80,9 @@ def markup(picture: Picture) -> str:
     lines = list(picture.lines.values())
     if not lines:
         return '<p class="quiet nothing">No unit of this cell has a serial line.</p>'
-    facts = {line.name: {"units": list(line.units), "words": _words(line, picture)} for line in lines}
+    facts = {
+        line.name: {"units": list(line.units), "host": line.host, "words": _words(line, picture)} for line in lines
+    }
     tabs = "".join(
         f'<button role="tab" data-line="{escape(line.name)}"><b>{escape(line.name)}</b>'
         f'<span class="quiet" data-live="l.{escape(line.name)}.format">{escape(line.format)}</span></button>'

@@ -1,0 +1,270 @@
+"""What reaches whom in one instant: levels over nets, characters over lines, motions to those who follow them.
+
+What the parts did is delivered in rounds, parts in file order, their outputs in the order they were made and never
+merged; what a round causes is delivered in the next. More than `MOST_DELIVERIES` in one instant is an oscillation, and
+an error that names its pins.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
+
+from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.cell.breakage import Faults, find_pin
+from detent.cell.recording import InputSet, Received, Recording
+from detent.cell.wiring import Wiring
+from detent.controllers.device import Device, DriveSet, Output, Powered, StageSet, StoreImage
+from detent.lines.line import EVERYBODY, Line
+from detent.pins import HIGH, LOW, Level, Net, PinSet
+from detent.ticks import NEVER, Ns
+from detent.uart import Sent
+
+MOST_DELIVERIES = 1_000
+
+Store: TypeAlias = Callable[[str, bytes], bool]
+"""Write the non-volatile image of a unit; say whether that succeeded."""
+
+
+class Oscillation(RuntimeError):
+    """Outputs change each other without end in one instant."""
+
+
+class Outside(NamedTuple):
+    """What a cell reaches for outside: its copies reach for the same."""
+
+    store: Store
+
+    def __deepcopy__(self, _: object) -> "Outside":
+        return self
+
+
+def no_store(unit: str, image: bytes) -> bool:
+    """Images stay in the units' own memory: what a cell does that nobody gave a place for files."""
+    return True
+
+
+class Delivery:
+    """The parts of a cell, what joins them, and what is broken of it. `now` is set by who knows the time (`Cell`)."""
+
+    def __init__(
+        self, wiring: Wiring, parts: Sequence[Device], nets: Sequence[Net], lines: Sequence[Line], store: Store,
+        recording: Recording | None,
+    ) -> None:  # fmt: skip
+        self.wiring = wiring
+        self.parts = list(parts)
+        self.nets = list(nets)
+        self.lines = list(lines)
+        self.now: Ns = 0
+        self.recording = recording
+        self._outside = Outside(store)
+        self.faults = Faults()
+        self._hands: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
+        self._supplied: set[int] = set()  # units that are switched on
+        self._deadlines: list[Ns] = [NEVER] * len(parts)
+        self._line_deadline: Ns = NEVER  # the earliest of all lines
+        self._touched: set[int] = set()
+        self._instant: Ns = -1
+        self._deliveries: Counter[str] = Counter()  # of this instant, by pin
+
+    # -- what reaches whom -------------------------------------------------------------------------------
+
+    def _settle(self) -> None:
+        """Deliver in rounds until nobody has anything more to tell."""
+        touched = self._touched
+        while touched:
+            if len(touched) == 1:  # nearly always
+                index = touched.pop()
+                self._deliver(index, self._drain(index))
+            else:
+                round_ = sorted(touched)
+                touched.clear()
+                for index, out in [(index, self._drain(index)) for index in round_]:
+                    self._deliver(index, out)
+
+    def _drain(self, index: int) -> Sequence[Output]:
+        """What a part did, and when it wants to be advanced next."""
+        part = self.parts[index]
+        deadline = part.next_deadline()
+        self._deadlines[index] = NEVER if deadline is None else deadline
+        return part.drain()
+
+    def _deliver(self, index: int, out: Sequence[Output]) -> None:
+        if not out:
+            return
+        if index < self.wiring.units and self.recording is not None:
+            self.recording.extend(index, out)
+        drives = self.wiring.drives[index]
+        for item in out:
+            kind = type(item)
+            if kind is PinSet:
+                net = drives.get(item.pin)  # type: ignore[union-attr]
+                if net is not None:
+                    self._drive(net, (index, item.pin), item.level)  # type: ignore[union-attr]
+            elif kind is Sent:
+                place = self.wiring.speaks[index].get(item.port)  # type: ignore[union-attr]
+                if place is not None:
+                    line = self.lines[place[0]]
+                    line.from_unit(place[1], item)  # type: ignore[arg-type]
+                    if line.deadline < self._line_deadline:
+                        self._line_deadline = line.deadline
+            elif kind in _MOTION:
+                for follower in self.wiring.followers[index]:
+                    self.parts[follower].follow(item)  # type: ignore[attr-defined]
+                    self._touched.add(follower)
+            elif kind is DriveSet or kind is StageSet:
+                for follower in self.wiring.followers[index]:
+                    self.parts[follower].heed(item)  # type: ignore[attr-defined]
+                    self._touched.add(follower)
+            elif kind is StoreImage:
+                name = self.wiring.names[index]
+                ok = self.faults.writable(name) and self._outside.store(name, item.image)  # type: ignore[union-attr]
+                self.parts[index].stored(ok, self.now)
+                self._touched.add(index)
+            elif kind is Powered:
+                for follower in self.wiring.followers[index]:
+                    self.parts[follower].heed(item)  # type: ignore[attr-defined]
+                    self._touched.add(follower)
+                if not item.on:  # type: ignore[union-attr]
+                    for pin, net in drives.items():
+                        self._drive(net, (index, pin), HIGH)
+
+    def _drive(self, net: int, driver: tuple[int, str], level: Level) -> None:
+        wire = self.nets[net]
+        if wire.drive(driver, level):
+            for part, pin in self.wiring.reads[net]:
+                self._set_pin(part, pin, wire.level)
+
+    def _set_pin(self, index: int, pin: str, level: Level) -> None:
+        if self._instant != self.now:
+            self._instant = self.now
+            self._deliveries.clear()
+        name = f"{self.wiring.names[index]}.{pin}"
+        self._deliveries[name] += 1
+        if self._deliveries.total() > MOST_DELIVERIES:
+            pins = ", ".join(pin for pin, count in self._deliveries.most_common(8) if count > 1)
+            raise Oscillation(
+                f"more than {MOST_DELIVERIES} level changes at {self.now} ns: {pins} change each other without end; "
+                "break the loop or put something that takes time into it"
+            )
+        if index < self.wiring.units and self.recording is not None:
+            self.recording.extend(index, (InputSet(self.now, pin, level),))
+        self.parts[index].set_pin(pin, level, self.now)
+        self._touched.add(index)
+
+    def _match_line(self, number: int) -> None:
+        """The host of a line speaks as all its units are strapped to hear, from the moment one is switched on."""
+        if number < 0:
+            return
+        line = self.lines[number]
+        forms = {self.parts[unit].line_format for unit, _ in self.wiring.lines[number]}  # type: ignore[attr-defined]
+        if len(forms) == 1 and line.format not in forms:
+            line.change(forms.pop())
+            self._plan_lines()
+
+    def _plan_lines(self) -> None:
+        earliest = NEVER
+        for line in self.lines:
+            if line.deadline < earliest:
+                earliest = line.deadline
+        self._line_deadline = earliest
+
+    def _hear(self, at: Ns) -> None:
+        """Characters whose stop bits end now reach the units of their lines."""
+        for line, units in zip(self.lines, self.wiring.lines, strict=True):
+            if line.deadline > at:
+                continue
+            for level in line.strobes(at):
+                for unit, _ in units:
+                    self._set_pin(unit, line.strobe, level)
+            arrived = line.advance(at)
+            if line.started():
+                for unit, port in units:
+                    self.parts[unit].set_pin(port, LOW, at)
+                    self._touched.add(unit)
+            places = {arrival.place for arrival in arrived}
+            if not places:
+                continue
+            heard = [arrival.sent for arrival in arrived]
+            chars = [sent.char for sent in heard]
+            for place, (unit, port) in enumerate(units):
+                if places != _ALL:  # not everything is for everybody
+                    heard = [arrival.sent for arrival in arrived if arrival.place in (place, EVERYBODY)]
+                    chars = [sent.char for sent in heard]
+                if chars:
+                    if self.recording is not None:
+                        self.recording.extend(unit, [Received(s.done, port, s.char, s.at) for s in heard])
+                    self.parts[unit].receive(port, chars, at)
+                    self._touched.add(unit)
+        self._plan_lines()
+        self._settle()
+
+    # -- what faults and hands do to it ------------------------------------------------------------------
+
+    def supply(self, part: int, on: bool) -> None:
+        """Switch the supply of a unit, now."""
+        if on:
+            self._supplied.add(part)
+        else:
+            self._supplied.discard(part)
+        self.parts[part].power(on, self.now)
+        self._touched.add(part)
+        if on:
+            self._match_line(self.wiring.line_of[part])
+        self._settle()
+
+    def supplied(self, part: int) -> bool:
+        """Whether a unit is switched on."""
+        return part in self._supplied
+
+    def give(self, part: int, pin: str, level: Level) -> None:
+        """Give an input a level, now."""
+        self._set_pin(part, pin, level)
+        self._settle()
+
+    def given(self, part: int, pin: str) -> Level:
+        """The level that an input is given by its wire; without a wire, by a hand; else its level at rest."""
+        net = self.net_read(part, pin)
+        if net is not None:
+            return self.nets[net].level
+        found = find_pin(self.parts[part].pins, pin)
+        return self._hands.get((part, pin), HIGH if found is None else found.rest)
+
+    def drive(self, net: int, driver: tuple[int, str], level: Level) -> None:
+        """Put a level on a net, now."""
+        self._drive(net, driver, level)
+        self._settle()
+
+    def net_driven(self, part: int, pin: str) -> int | None:
+        """The net that an output drives, if a wire leads from it."""
+        return self.wiring.drives[part].get(pin)
+
+    def net_read(self, part: int, pin: str) -> int | None:
+        """The net that an input is wired to, stuck or not."""
+        reader = part, pin
+        for net, readers in enumerate(self.wiring.reads):
+            if reader in readers or reader in self.faults.readers(net):
+                return net
+        return None
+
+    def spare_net(self) -> int:
+        """A new net, to which nothing is joined."""
+        self.nets.append(Net())
+        self.wiring = self.wiring.with_net()
+        return len(self.nets) - 1
+
+    def lead(self, part: int, pin: str, net: int) -> None:
+        """Let an output that drives a net drive another one."""
+        self.wiring = self.wiring.led(part, pin, net)
+
+    def listen(self, net: int, pins: Sequence[tuple[int, str]]) -> None:
+        """Let these inputs, and no others, read a net."""
+        self.wiring = self.wiring.heard_by(net, pins)
+
+    def exchange(self, line: int, other: Line) -> None:
+        """Put another line in the place of a line."""
+        self.lines[line] = other
+        self._plan_lines()
+
+
+_ALL = {EVERYBODY}
+_MOTION = (MotionStarted, MotionCut, MotionEnded)
