@@ -169,7 +169,7 @@ while motor.moving:
 told["where"] = motor.position
 motor.velocity.put(50, wait=True)
 motor.set_current_position(2)
-told["set"] = motor.position
+told["set"] = motor.user_readback.get(use_monitor=False)  # a put may be answered before its monitors have come
 motor.user_offset.put(0, wait=True)
 kinds = []
 RunEngine()(scan([det], motor, 1, 3, 5), lambda name, document: kinds.append(name))

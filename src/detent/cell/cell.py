@@ -161,7 +161,7 @@ class Cell(Delivery):
         index = self.unit(unit)
         line = self.wiring.line_of[index]
         if line < 0:
-            raise ValueError(f"unit {unit!r} is on no line")
+            raise ValueError(f"unit {unit!r} is on no line with a host outside: a unit that is its host can send to it")
         self.send(line, self.talker(unit).frame(text))
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:

@@ -85,6 +85,7 @@ def test_a_motor_is_judged_as_the_move_changes(motion: Window) -> None:
     assert "lost" in verdict.inner_text()
 
 
+@pytest.mark.slow
 def test_the_motor_of_the_cell_is_the_one_that_is_shown(windows: Windows, serve: Any) -> None:
     window = at_motion(windows.new(serve(CLOSED_LOOP)).open())
     assert window.page.locator("select[name=motor]").input_value() == "fitted"

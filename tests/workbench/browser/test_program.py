@@ -180,6 +180,7 @@ def test_a_draft_outlives_the_page(program: Window) -> None:
     assert "\u2022" in program.page.locator(".program-file").inner_text()
 
 
+@pytest.mark.slow
 def test_a_unit_without_programs_says_so_and_takes_a_script(windows: Windows, serve: Any) -> None:
     window = windows.new(serve("bs0610")).open()
     window.call("forget_draft", "script.bs0610")

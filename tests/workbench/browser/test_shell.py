@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.workbench.browser.windows import PHONE, THEMES, WIDE, Served, Window, Windows, begun
+from tests.workbench.browser.windows import LOOKS, PHONE, Served, Window, Windows, begun
 
 HOMING = Path(__file__).parents[3] / "examples" / "homing" / "cell.toml"
 SMALL = """() => [...document.querySelectorAll('button, a, select, input')]
@@ -27,8 +27,7 @@ def test_every_page_opens_from_its_tab_and_loads_nothing_from_elsewhere(window: 
     assert window.foreign() == []
 
 
-@pytest.mark.parametrize("theme", THEMES)
-@pytest.mark.parametrize("size", [WIDE, PHONE])
+@pytest.mark.parametrize(("size", "theme"), LOOKS)
 def test_the_pages_are_no_wider_than_the_window_and_large_enough_to_tap(
     windows: Windows, workbench: Served, size: tuple[int, int], theme: str
 ) -> None:
@@ -167,6 +166,7 @@ def test_what_is_no_byte_no_place_and_no_pace_is_refused_and_harms_nothing(guard
     assert guarded.get("crashed") is None
 
 
+@pytest.mark.slow
 def test_where_a_unit_is_the_host_of_a_line_no_command_is_offered(
     windows: Windows, serve: Callable[..., Served]
 ) -> None:
