@@ -142,7 +142,8 @@ class Cell(Delivery):
         """The host of a line sends `data`, now; characters may be damaged already."""
         if not self._acting:
             self._catch_up()
-            self._keep(Send(line, data if isinstance(data, bytes) else tuple(data)))
+            if self.journaling:
+                self._keep(Send(line, data if isinstance(data, bytes) else tuple(data)))
         chars = self.lines[line].immediate(data)
         if chars:  # nothing waits on such a line: what is sent is heard
             for unit, port in self.wiring.lines[line]:

@@ -74,7 +74,8 @@ class Line:
         """`data` as every unit hears it at once, on a plain line without timing; else nothing: `send` it."""
         if not self._immediate:
             return []
-        return [self._narrowed(char) for char in characters(data)]
+        limit = 1 << self.format.data_bits
+        return [char if char.value < limit else self._narrowed(char) for char in characters(data)]
 
     def send(self, data: Chars, now: Ns) -> None:
         """The host sends `data`, behind what it is still sending. A byte too wide for the line arrives damaged."""
