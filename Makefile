@@ -43,8 +43,9 @@ lock: $(UV)
 $(STAMP): requirements.lock pyproject.toml | $(UV)
 	@echo "Setting up .venv ..."
 	@$(UV) venv --quiet --allow-existing --python '>=3.11' .venv
-	@$(UV) pip sync --quiet --python $(PYTHON) --require-hashes requirements.lock
+	@$(UV) pip sync --quiet --compile-bytecode --python $(PYTHON) --require-hashes requirements.lock
 	@$(UV) pip install --quiet --python $(PYTHON) --no-deps --no-build-isolation --editable .
+	@$(PYTHON) -m compileall -q src  # some machines never write it by themselves, and then every start is slow
 	@touch $(STAMP)
 
 .uv/bin/uv:

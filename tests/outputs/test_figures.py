@@ -201,7 +201,7 @@ def test_another_suffix_is_refused_with_the_list(name, tmp_path):
 
 @pytest.fixture
 def needs_matplotlib():
-    pytest.importorskip("matplotlib", reason="matplotlib is not installed (detent[figures])")
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed (detent-motion[figures])")
 
 
 @pytest.mark.usefixtures("needs_matplotlib")

@@ -39,6 +39,7 @@ def main(tokens: Sequence[str] | None = None) -> None:
     from cyclopts import App, CycloptsError, Parameter
 
     import detent
+    from detent.extras import MissingExtra
 
     given = list(sys.argv[1:] if tokens is None else tokens)
     app = App(
@@ -57,6 +58,9 @@ def main(tokens: Sequence[str] | None = None) -> None:
     try:
         app(given)
     except CycloptsError:
+        sys.exit(ASKED_WRONGLY)
+    except MissingExtra as error:
+        print(f"detent: {error}", file=sys.stderr)
         sys.exit(ASKED_WRONGLY)
     except KeyboardInterrupt:
         sys.exit(130)

@@ -31,9 +31,11 @@ def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bo
     from detent.cli.run import result
     from detent.cli.target import asked_wrongly, failed, target
     from detent.controllers.catalogue import unknown
+    from detent.outputs.figures import check
 
     if name not in TITLES:
         asked_wrongly(unknown("example", name, tuple(TITLES)))
+    check(output / f"{name}.png")
     place = examples() / name / "cell.toml"
     found = target(str(place))
     cell = build(found.description, found.read)

@@ -112,6 +112,7 @@ def epics(
     """
     from detent.cell.description import Problem
     from detent.cli.target import asked_wrongly
+    from detent.extras import MissingExtra, need
 
     given = {"resolution": resolution, "egu": egu, "low": low, "high": high, "velocity": velocity, "base": base,
              "max-velocity": max_velocity, "acceleration": acceleration}  # fmt: skip
@@ -122,21 +123,12 @@ def epics(
             if not 0 < ca_port < 65536:
                 raise Problem("", "--ca-port", f"{ca_port} is no port; it takes 1 to 65535")
             os.environ["EPICS_CA_SERVER_PORT"] = str(ca_port)
-        _need_caproto()
+        need("epics", "EPICS records need")
         with _axes(target, port, unit, given, pace=pace, line_timing=line_timing, strap=strap, options=set_) as axes:
             ready = _ready(prefix, axes, json=json, fields=list_pvs)
             asyncio.run(_serve(prefix, axes, interfaces, ready, quiet=json))
-    except (Problem, ValueError) as error:
+    except (Problem, MissingExtra, ValueError) as error:
         asked_wrongly(error)
-
-
-def _need_caproto() -> None:
-    from detent.cell.description import Problem
-
-    try:
-        import caproto  # noqa: F401
-    except ImportError:
-        raise Problem("", "", "epics needs the package caproto: pip install 'detent[epics]'") from None
 
 
 @contextmanager

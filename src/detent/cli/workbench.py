@@ -7,7 +7,6 @@ import sys
 import webbrowser
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -85,6 +84,7 @@ def workbench(
     from detent.cli.serve import asked_endpoints
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
+    from detent.extras import MissingExtra, need
     from detent.realtime.images import ImagesUnusable, cell_name, default_folder
 
     links = list(pty) if pty is not None else None
@@ -94,13 +94,12 @@ def workbench(
     shown = target if target is not None else str(examples() / FIRST)
     kept = state if state is not None else default_folder()
     try:
-        if find_spec("nicegui") is None:
-            raise Problem("", "", "the workbench needs NiceGUI: pip install 'detent[workbench]'")
+        need("workbench", "the workbench needs")
         if not (math.isfinite(pace) and pace > 0):
             raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
         endpoints = asked_endpoints(links, tcp, rfc2217, serial)
         find(shown, straps=strap, options=set_)  # at once, not when everything is loaded
-    except Problem as error:
+    except (Problem, MissingExtra) as error:
         asked_wrongly(error)
     from detent.workbench.client import Bench, BenchError
     from detent.workbench.drafts import Drafts

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+from detent.extras import how_to_install
 from detent.motors import kernel
 from detent.motors.motor import MotorError
 
@@ -53,6 +54,5 @@ def advance() -> Kernel:
 def check_size(substeps: float, what: str) -> None:
     """Raise TooLong if plain Python would be at it for minutes."""
     if not fast() and substeps > MOST_PLAIN_SUBSTEPS:
-        raise TooLong(
-            f"{what} takes {substeps:.2g} substeps, minutes without numba: pip install 'detent[fast]', or ask for less"
-        )
+        remedy = how_to_install("fast")
+        raise TooLong(f"{what} takes {substeps:.2g} substeps, minutes without numba: ask for less, or {remedy}")

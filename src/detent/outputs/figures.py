@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from detent.extras import need
 from detent.outputs import curves
 from detent.outputs.curves import Band
 from detent.outputs.files import write_whole
@@ -63,10 +64,11 @@ class Strip(NamedTuple):
 
 
 def check(path: Path) -> None:
-    """ValueError if no figure can be written to a file of this name."""
+    """ValueError if no figure can be written to a file of this name, MissingExtra if none can be drawn here."""
     if path.suffix.lower() not in FORMATS:
         shown = f"{path.suffix!r}" if path.suffix else "no suffix"
         raise ValueError(f"{path}: a figure is one of {', '.join(FORMATS)}, not {shown}: choose another file name")
+    need("figures", "figures need")
 
 
 def write(
@@ -140,10 +142,9 @@ def _changes(unit: UnitSignals, pin: str, until: Ns) -> bool:
 
 def style() -> Any:
     """The settings of all our figures, whatever the user's own are."""
-    try:
-        import matplotlib
-    except ImportError:
-        raise ImportError("figures need matplotlib: pip install 'detent[figures]'") from None
+    need("figures", "figures need")
+    import matplotlib
+
     keep_out = {"backend", "backend_fallback", "interactive", "toolbar", "timezone"}
     settings: dict[Any, Any] = {key: value for key, value in matplotlib.rcParamsDefault.items() if key not in keep_out}
     return matplotlib.rc_context(settings | _SETTINGS)

@@ -9,13 +9,13 @@ Two ways to run the inner loop of long ramps give the same integers: NumPy, and 
 
 from collections.abc import Callable
 from importlib import import_module
-from importlib.util import find_spec
 from math import sqrt
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from detent.extras import installed, need
 from detent.pulses.segment import Int64Array
 from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, Fixed, Ns
 
@@ -46,15 +46,15 @@ _path: Path = "auto"
 def use(path: Path) -> None:
     """Choose the inner loop: "numpy", "numba" (ImportError if absent), or "auto" (numba for long runs only)."""
     global _path
-    if path == "numba" and find_spec("numba") is None:
-        raise ImportError("numba is not installed: pip install 'detent[fast]', or use(\"auto\")")
+    if path == "numba":
+        need("fast", 'the inner loop "numba" needs')
     _path = path
 
 
 def dense_wanted(pulses: int) -> bool:
     """Whether a run of so many pulses goes to the numba loop."""
     if _path == "auto":
-        return pulses >= DENSE_FROM and find_spec("numba") is not None
+        return pulses >= DENSE_FROM and installed("fast")
     return _path == "numba"
 
 

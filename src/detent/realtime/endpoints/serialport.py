@@ -5,6 +5,7 @@ import select
 import termios
 from collections.abc import Sequence
 
+from detent.extras import how_to_install
 from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost, Outgoing, read_ready
 from detent.realtime.pace import WallNs
 from detent.uart import Format
@@ -20,7 +21,7 @@ class SerialPort:
         try:
             import serialx
         except ImportError as error:
-            raise EndpointError("--serial needs the package serialx: pip install serialx") from error
+            raise EndpointError(f"--serial needs serialx, which is not installed: {how_to_install()}") from error
         self.address = address
         try:
             self._port = serialx.Serial(  # type: ignore[abstract]  # it is this system's own class

@@ -1,0 +1,93 @@
+"""What a message says that asks for an optional part: the line that installs it, for this kind of installation."""
+
+import json
+import sys
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+
+import pytest
+
+from detent import extras
+
+
+class Installed:
+    """A distribution as `importlib.metadata` shows it: of an editable checkout, or of a wheel."""
+
+    def __init__(self, sources: Path | None) -> None:
+        self.sources = sources
+
+    def read_text(self, name: str) -> str | None:
+        assert name == "direct_url.json"
+        if self.sources is None:
+            return None
+        return json.dumps({"url": self.sources.as_uri(), "dir_info": {"editable": True}})
+
+
+@pytest.fixture
+def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An environment of a wheel, with a pip of its own; tests make it what they need."""
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "bin" / "python"))
+    monkeypatch.setattr(extras, "distribution", lambda name: Installed(None))
+    monkeypatch.setattr(extras, "find_spec", lambda name: object())
+    return tmp_path
+
+
+def test_in_an_environment_its_own_pip_installs(prefix: Path) -> None:
+    assert extras.how_to_install("fast") == f"{prefix}/bin/python -m pip install 'detent-motion[fast]'"
+
+
+def test_where_there_is_no_pip_uv_does(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(extras, "find_spec", lambda name: None)
+    assert extras.how_to_install("fast") == f"uv pip install --python {prefix}/bin/python 'detent-motion[fast]'"
+
+
+def test_a_tool_of_uv_or_pipx_is_installed_anew(prefix: Path) -> None:
+    (prefix / "pipx_metadata.json").touch()
+    assert extras.how_to_install("epics") == "pipx install --force 'detent-motion[epics]'"
+    (prefix / "uv-receipt.toml").touch()
+    assert extras.how_to_install("epics") == "uv tool install --force 'detent-motion[epics]'"
+
+
+def test_a_checkout_is_set_up_again(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sources = prefix / "with a blank"
+    sources.mkdir()
+    monkeypatch.setattr(extras, "distribution", lambda name: Installed(sources))
+    assert extras.how_to_install("workbench") == f"{prefix}/bin/python -m pip install -e '{sources}[workbench]'"
+    (sources / "Makefile").touch()
+    assert extras.how_to_install("workbench") == f"make -B -C '{sources}' setup"
+
+
+def test_sources_on_the_path_alone_take_the_distribution(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent(name: str) -> Installed:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(extras, "distribution", absent)
+    assert extras.how_to_install().endswith("pip install detent-motion")
+
+
+@pytest.mark.parametrize("extra", sorted(extras.EXTRAS))
+def test_a_missing_part_is_named_with_its_remedy(extra: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, extras.EXTRAS[extra], None)
+    assert not extras.installed(extra)
+    with pytest.raises(extras.MissingExtra, match=f"figures need {extras.EXTRAS[extra]}, which is not installed: "):
+        extras.need(extra, "figures need")
+
+
+def test_every_extra_for_users_is_known_and_no_other() -> None:
+    import tomllib
+
+    declared = tomllib.loads(Path("pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(extras.EXTRAS) == set(declared) - {"dev"}
+
+
+def test_nothing_tells_to_install_the_distribution_of_somebody_else() -> None:
+    """`detent` on the package index is another program."""
+    wrong = ("pip install " + "detent", "pip install 'detent[", "tool install " + "detent", "pipx install " + "detent")
+    found = []
+    for folder in ("src", "docs", "examples", "tests", "bench", ".ci"):
+        paths = [path for path in Path(folder).rglob("*") if path.suffix in (".py", ".md", ".toml", ".js", ".txt")]
+        for path in [*paths, *Path().glob("*.md"), Path("Makefile"), Path("pyproject.toml")]:
+            text = path.read_text(encoding="utf-8").replace("detent-motion", "")
+            found += [f"{path}: {line}" for line in text.splitlines() if any(words in line for words in wrong)]
+    assert [line for line in found if not line.startswith("tests/test_extras.py")] == []
