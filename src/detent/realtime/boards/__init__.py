@@ -1,0 +1,24 @@
+"""Step pulses on real pins: boards with stock Klipper firmware, as a host meets them.
+
+Written from what the firmware says of itself (its dictionary) and from the behaviour of its Linux process; see
+docs/reference/boards.md. Nothing here reads a clock or a descriptor but `ports`: classes take bytes and a reading of
+the wall clock and give bytes, so the same code runs against the fake board in virtual time and on a serial port.
+
+| module | what |
+|---|---|
+| `frames` | blocks, their checksum, integers of variable length |
+| `dictionary` | what a board says of itself; messages by name, pins, constants |
+| `link` | sequence numbers, window, retransmission |
+| `clock` | the board's time, estimated from round trips; ticks of cell time |
+| `setup` | what hangs on which pin |
+| `board` | one board: configuration, move queue, shutdown, recovery |
+| `stepper` | one axis: motion entries in, runs of steps out |
+| `outs`, `inputs`, `stops` | digital outputs with a watchdog, inputs, stops in the firmware |
+| `drivers`, `registers` | TMC2208/2209 by UART, TMC2130/5160 by SPI |
+| `several` | all boards of a cell, one of them master of time |
+| `ports` | a serial device, or the fake board |
+| `events` | what comes back |
+
+**Time.** `wall` is always the host's monotonic clock in ns. Cell time is the board's time: `Boards.now` gives its
+nanoseconds, from which a `Pace` makes cell time. What the cell does at t leaves the pins at t + lead.
+"""
