@@ -306,3 +306,18 @@ def test_damaged_characters_of_a_host_reach_the_unit_so_and_are_replayed() -> No
     again.run_to(100 * MS)
     assert again.recording is not None
     assert list(again.recording) == list(made.recording)
+
+
+def test_any_number_of_commands_in_one_instant_are_sent_and_replayed() -> None:
+    """A script of 500 lines at one time, and 500 sent by a hand at one time: the journal makes the same recording."""
+    lines = ", ".join(['"V1"'] * 500)
+    text = f'{ONE.replace("unit]", "x]")}[[script]]\nat = "1 ms"\nsend = [{lines}]\nto = "x"\n'
+    made = cell(text)
+    made.run_to(1 * SECOND)
+    for _ in range(500):
+        made.type("x", "V1")
+    made.run_to(2 * SECOND)
+    again = cell(text, journal=list(made.journal))
+    again.run_to(2 * SECOND)
+    assert list(made.recording or ()) == list(again.recording or ())
+    assert len(made.journal) == 500

@@ -62,7 +62,8 @@ class Cell(Delivery):
         self._script = Script(sorted(script, key=lambda action: action.at))
         self._next_action = 0
         self._acting = True  # it is being built, or the script is doing it
-        self._script_deadline: Ns = self._script[0].at if self._script else NEVER
+        self._script_deadline: Ns = NEVER
+        self._note_next_action()
 
     def begin(self, *, journaling: bool) -> None:
         """It is built: what is done to it from now on comes from outside. Its journal has all of it, or nothing."""
@@ -97,6 +98,14 @@ class Cell(Delivery):
     def _advance(self, at: Ns) -> None:
         """One instant: the parts' own deadlines, then pins and power, then characters."""
         self.now = at
+        self._advance_parts(at)
+        if self._script_deadline <= at:
+            self._act(at)
+        if self._line_deadline <= at:
+            self._hear(at)
+
+    def _advance_parts(self, at: Ns) -> None:
+        """The deadlines of the parts that are due, and what follows from them."""
         units, contacts = self.wiring.units, False
         for index, deadline in enumerate(self._deadlines):
             if deadline <= at:
@@ -112,23 +121,24 @@ class Cell(Delivery):
                     self.parts[index].advance(at)
                     self._touched.add(index)
             self._settle()
-        if self._script_deadline <= at:
-            self._act(at)
-        if self._line_deadline <= at:
-            self._hear(at)
 
     def _act(self, at: Ns) -> None:
-        """Carry out the script's actions that are due."""
-        while self._next_action < len(self._script) and self._script[self._next_action].at <= at:
+        """Carry out the script's actions that are due; what one makes due in the parts comes before the next."""
+        while self._script_deadline <= at:
             action = self._script[self._next_action]
             if action.outside and (min(self._deadlines) <= at or self._line_deadline <= at):
                 return  # the rest of this instant comes before it
             self._next_action += 1
+            self._note_next_action()
             self._acting = True
             action.deed.do(self)
             self._acting = False
-        left = self._script[self._next_action :]
-        self._script_deadline = left[0].at if left else NEVER
+            while min(self._deadlines) <= at:
+                self._advance_parts(at)
+
+    def _note_next_action(self) -> None:
+        left = self._next_action < len(self._script)
+        self._script_deadline = self._script[self._next_action].at if left else NEVER
 
     def _catch_up(self) -> None:
         """What an action from outside makes due in this very instant happens in it."""
@@ -155,7 +165,8 @@ class Cell(Delivery):
         else:
             self.lines[line].send(data, self.now)
             self._plan_lines()
-        self._catch_up()
+        if not self._acting:
+            self._catch_up()
 
     def type(self, unit: str, text: str) -> None:
         """The host of the unit's line sends the command line `text` to that unit, now."""
@@ -277,7 +288,7 @@ class Cell(Delivery):
         left = self._script[self._next_action :]
         place = bisect_left(left, action.at, key=lambda other: other.at)
         self._script, self._next_action = Script((*left[:place], action, *left[place:])), 0
-        self._script_deadline = self._script[0].at
+        self._note_next_action()
 
     # -- looking -----------------------------------------------------------------------------------------
 

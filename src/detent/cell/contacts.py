@@ -1,6 +1,6 @@
 """What a motor in a cell shows to wires: its pins, the contacts on its axis, the step detector."""
 
-from math import inf
+from math import inf, nextafter
 from typing import NamedTuple
 
 from detent.pins import HIGH, LOW, Level, Pin, PinKind
@@ -19,6 +19,23 @@ PINS: tuple[Pin, ...] = (
     Pin("Y", None, PinKind.OUTPUT, "encoder on the rotor"),
 )
 QUADRATURE = ((LOW, LOW), (HIGH, LOW), (HIGH, HIGH), (LOW, HIGH))
+
+
+class Edge(NamedTuple):
+    """An edge lies between two neighbouring floats: the last angle on its lower side, the first on its upper.
+
+    So every angle is on one side of it and on no other, and a rotor that stands there crosses nothing.
+    """
+
+    below: float
+    above: float
+
+    @classmethod
+    def at(cls, angle: float, *, upper: bool) -> "Edge":
+        """The edge at `angle`, which itself belongs to the upper side or to the lower one."""
+        if abs(angle) == inf:
+            return cls(angle, angle)
+        return cls(nextafter(angle, -inf), angle) if upper else cls(angle, nextafter(angle, inf))
 
 
 class Contact(NamedTuple):
@@ -60,10 +77,6 @@ class Contact(NamedTuple):
     def pin(self) -> Pin:
         """Its contact, as a pin of the mechanics."""
         return Pin(self.name, None, PinKind.OUTPUT, "contact on the axis")
-
-    def side(self, place: float) -> int:
-        """Where the rotor is: -1 below, 0 within, 1 above."""
-        return -1 if place < self.low else 1 if place > self.high else 0
 
     def level(self, side: int) -> Level:
         """The level of the contact there."""

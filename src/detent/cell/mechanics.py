@@ -10,12 +10,12 @@ thrown away.
 from collections.abc import Sequence
 from copy import deepcopy
 from math import floor, inf, pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.contacts import DETECTOR, PINS, QUADRATURE, Contact, Detector
+from detent.cell.contacts import DETECTOR, PINS, QUADRATURE, Contact, Detector, Edge
 from detent.cell.course import SAMPLE, SLICE, Course, crossing_time, row_of
 from detent.cell.power import Power
 from detent.cell.recording import Log
@@ -28,6 +28,16 @@ from detent.motors.rotor import Floats, Rig, Rotor
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver
 from detent.ticks import NEVER, Ns
 from detent.uart import Char
+
+
+class _Wait(NamedTuple):
+    """Somebody waits for the rotor to reach `angle` of an edge, from below (`up`) or from above."""
+
+    angle: float
+    up: bool
+    contact: int = -1  # that then is at `side`
+    side: int = 0
+    quarter: int = 0  # that the encoder then goes on; with neither it is the step detector
 
 
 class Mechanics:
@@ -62,12 +72,12 @@ class Mechanics:
         self._inputs: dict[str, Level] = {pin.name: HIGH for pin in PINS if pin.kind.reads}
         self._out: list[Output] = []
         self._driver = PinDriver(self._out)
-        self._sides = [contact.side(self.place_of(rotor.angle)) for contact in self.contacts]
-        self._quarter = floor(self.place_of(rotor.angle) + 0.5)  # of the encoder
+        self._sides = [self._side(contact, rotor.angle) for contact in self.contacts]
+        self._quarter = self._quarter_at(rotor.angle)  # of the encoder
         self._wanted: float | None = None  # where DONE waits for the rotor, el. rad
         self._checked = 0  # pulses of the train that the detector has seen
         self._crossing: Ns = NEVER
-        self._edge = (0.0, True)  # the angle that is reached then, and whether from below
+        self._reached = (0.0, True)  # the angle that is reached then, and whether from below
         self._horizon: Ns = NEVER
         self.deadline: Ns = NEVER
         self._powered = False
@@ -118,10 +128,8 @@ class Mechanics:
         """At the start of a cell: tell every level."""
         if on:
             self._powered = True
-            for contact, side in zip(self.contacts, self._sides, strict=True):
-                self._driver.set(contact.name, contact.level(side), now)
             self._driver.set("DONE", HIGH, now)
-            self._tell_quarter(now)
+            self._tell(now)
             self._plan(now)
 
     def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
@@ -200,7 +208,7 @@ class Mechanics:
         index = self.contact_names.index(name)
         moved = self.contacts[index].moved(low, high)
         self.contacts = (*self.contacts[:index], moved, *self.contacts[index + 1 :])
-        self._sides[index] = moved.side(float(self.place_of(self._course.rotor.angle)))
+        self._sides[index] = self._side(moved, self.rotor_at(now).angle)
         if self._powered:
             self._driver.set(name, moved.level(self._sides[index]), now)
         self._plan(now)
@@ -299,6 +307,10 @@ class Mechanics:
             course.rotor = Rotor(self.rig, course.sequencer, now, SAMPLE)
             course.sequencer.level = level
         self._first = row_of(course.rotor, now)
+        self._sides = [self._side(contact, course.rotor.angle) for contact in self.contacts]
+        self._quarter = self._quarter_at(course.rotor.angle)
+        if self._powered:
+            self._tell(now)
 
     def _set_decay(self, level: Level, now: Ns) -> None:
         sequencer = self._course.sequencer
@@ -318,42 +330,73 @@ class Mechanics:
         course.go(now, trace=self.trace)
         course.last = last
 
-    def _edges(self) -> list[tuple[float, int]]:
-        """The angles at which something changes: up (1) or down (-1)."""
-        edges = []
-        for contact, side in zip(self.contacts, self._sides, strict=True):
+    def _edges(self, contact: Contact) -> tuple[Edge, Edge]:
+        """Where the range of a contact begins and ends, by place; both ends are within."""
+        upper = self.sign > 0
+        return (Edge.at(self.angle_of(contact.low), upper=upper),
+                Edge.at(self.angle_of(contact.high), upper=not upper))  # fmt: skip
+
+    def _side(self, contact: Contact, angle: float) -> int:
+        """Where the rotor is at an angle: -1 below the range of a contact, 0 within, 1 above."""
+        low, high = self._edges(contact)
+        if self.sign > 0:
+            return -1 if angle <= low.below else 1 if angle >= high.above else 0
+        return -1 if angle >= low.above else 1 if angle <= high.below else 0
+
+    def _quarter_edge(self, quarter: int) -> Edge:
+        """Where this quarter of the encoder begins, by place."""
+        return Edge.at(self.angle_of(quarter - 0.5), upper=self.sign > 0)
+
+    def _quarter_at(self, angle: float) -> int:
+        """The quarter that the encoder is in at an angle."""
+        near: int = floor(self.place_of(angle) + 0.5)
+        for quarter in (near + 1, near):  # what rounding leaves open is settled by the edges alone
+            edge = self._quarter_edge(quarter)
+            if angle >= edge.above if self.sign > 0 else angle <= edge.below:
+                return quarter
+        return near - 1
+
+    def _waits(self) -> list[_Wait]:
+        """What there is to wait for."""
+        waits: list[_Wait] = []
+
+        def wait(edge: Edge, way: int, contact: int = -1, side: int = 0, quarter: int = 0) -> None:
+            if abs(edge.above) < inf:
+                up = way == self.sign
+                waits.append(_Wait(edge.above if up else edge.below, up, contact, side, quarter))
+
+        for k, (contact, side) in enumerate(zip(self.contacts, self._sides, strict=True)):
             if contact.name in self._watched:
-                edges += [(contact.low, 1)] if side < 0 else [(contact.high, -1)] if side > 0 else [
-                    (contact.low, -1), (contact.high, 1)]  # fmt: skip
+                low, high = self._edges(contact)
+                if side < 0:
+                    wait(low, 1, k, 0)
+                elif side > 0:
+                    wait(high, -1, k, 0)
+                else:
+                    wait(low, -1, k, -1)
+                    wait(high, 1, k, 1)
         if self._watched & {"X", "Y"}:
-            edges += [(self._quarter - 0.5, -1), (self._quarter + 0.5, 1)]
-        found = [(self.angle_of(place), way * self.sign) for place, way in edges if abs(place) < inf]
+            wait(self._quarter_edge(self._quarter), -1, quarter=-1)
+            wait(self._quarter_edge(self._quarter + 1), 1, quarter=1)
         if self._wanted is not None:
-            found.append((self._wanted, 1 if self._waits_upward else -1))
-        return found
-
-    @property
-    def _waits_upward(self) -> bool:
-        return self._course.direction > 0
-
-    def _limits(self) -> tuple[float, float]:
-        edges = self._edges()
-        return (max((angle for angle, way in edges if way < 0), default=-inf),
-                min((angle for angle, way in edges if way > 0), default=inf))  # fmt: skip
+            waits.append(_Wait(self._wanted, self._course.direction > 0))
+        return waits
 
     def _plan(self, now: Ns) -> None:
         """Look ahead, as far as it is worth it."""
         self._crossing = self._horizon = NEVER
         self._ahead = None
-        low, high = self._limits()
+        waits = self._waits() if self._powered else []
         idle = self._course.frozen and self._course.next_change() >= NEVER
-        if self._powered and (low > -inf or high < inf) and not idle:
+        if waits and not idle:
+            low = max((wait.angle for wait in waits if not wait.up), default=-inf)
+            high = min((wait.angle for wait in waits if wait.up), default=inf)
             ahead = self._course.twin()
             horizon = now + SLICE
             if ahead.go(horizon, low, high):
                 up = float(ahead.rotor.s[kernel.X_NEXT]) >= high
-                self._edge = (high if up else low), up
-                self._crossing = max(crossing_time(ahead.rotor, *self._edge), now)
+                self._reached = (high if up else low), up
+                self._crossing = max(crossing_time(ahead.rotor, *self._reached), now)
             else:
                 self._horizon, self._ahead = horizon, ahead
         self._replan()
@@ -362,25 +405,26 @@ class Mechanics:
         self.deadline = min(self._crossing, self._horizon, self._check_due())
 
     def _crossed(self, now: Ns) -> None:
-        """The rotor has reached an edge: the one it was looked ahead for, and any other at the same place."""
-        edge, up = self._edge
-        for k, contact in enumerate(self.contacts):
-            for place, way in ((contact.low, 1), (contact.high, -1)):
-                if abs(place) < inf and self.angle_of(place) == edge:
-                    rises = up == (self.sign > 0)
-                    side = (0 if rises else -1) if way == 1 else (1 if rises else 0)
-                    if side != self._sides[k]:
-                        self._sides[k] = side
-                        self._driver.set(contact.name, contact.level(side), now)
-        if self._watched & {"X", "Y"}:
-            for offset in (-0.5, 0.5):
-                if self.angle_of(self._quarter + offset) == edge:
-                    self._quarter += 1 if offset > 0 else -1
-                    self._tell_quarter(now)
-                    break
-        if self._wanted is not None and self._wanted == edge:
-            self._wanted = None
-            self._driver.set("DONE", HIGH, now)
+        """The rotor has reached what it was looked ahead for; whoever else waits for the same is told, too."""
+        for wait in self._waits():
+            if (wait.angle, wait.up) != self._reached:
+                continue
+            if wait.contact >= 0:
+                contact = self.contacts[wait.contact]
+                self._sides[wait.contact] = wait.side
+                self._driver.set(contact.name, contact.level(wait.side), now)
+            elif wait.quarter:
+                self._quarter += wait.quarter
+                self._tell_quarter(now)
+            else:
+                self._wanted = None
+                self._driver.set("DONE", HIGH, now)
+
+    def _tell(self, now: Ns) -> None:
+        """How the contacts and the encoder are."""
+        for contact, side in zip(self.contacts, self._sides, strict=True):
+            self._driver.set(contact.name, contact.level(side), now)
+        self._tell_quarter(now)
 
     def _tell_quarter(self, now: Ns) -> None:
         x, y = QUADRATURE[self._quarter % 4]
