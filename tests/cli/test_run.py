@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from zipfile import ZipFile
 
+import numpy as np
 import pytest
 
 from detent.cli import main
@@ -105,6 +106,46 @@ def test_waveforms_arrays_and_figures_are_written(tmp_path: Path, capsys: pytest
     assert files["png"].read_bytes().startswith(b"\x89PNG")
     assert "metadata" in ZipFile(files["sr"]).namelist()
     assert "gs-c200/step_times.npy" in ZipFile(files["npz"]).namelist()
+
+
+def test_steps_are_written_as_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each pulse of the run, computed from the rows as they are documented, is within the error of its time."""
+    file, arrays = tmp_path / "out.csv", tmp_path / "out.npz"
+    words = ["--steps", str(file), "--steps-frequency", "16000000", "--npz", str(arrays)]
+    assert detent("run", "gs-c200", "--send", "-300", *words) == 0
+    assert str(file) in capsys.readouterr().out
+    header, *rows = file.read_text().splitlines()
+    assert header == "axis,direction,base,interval,count,add"
+    ticks, directions = [], []
+    for row in rows:
+        axis, direction, *numbers = row.split(",")
+        base, interval, count, add = map(int, numbers)
+        assert axis == "gs-c200"
+        ticks += [base + k * interval + add * k * (k - 1) // 2 for k in range(1, count + 1)]
+        directions += [int(direction)] * count
+    kept = np.load(arrays)
+    assert directions == kept["gs-c200/step_directions"].tolist() == [-1] * 300
+    for tick, time in zip(ticks, kept["gs-c200/step_times"].tolist(), strict=True):
+        assert abs(tick * 1000 - time * 16) <= 16 * 1000
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--steps-frequency", "0"], "--steps-frequency 0: a clock has 1 tick a second or more"),
+        (["--steps-frequency", "150"], "150 ticks a second are too few for this train; take a faster clock"),
+        (["--steps-error", "2us"], 'Choose from: "exact"'),
+    ],
+)
+def test_steps_that_cannot_be_written_leave_the_file_alone(
+    words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "out.csv"
+    file.write_text("mine\n")
+    assert detent("run", "gs-c200", "--send", "+100", "--steps", str(file), *words) == 2
+    assert said in " ".join(capsys.readouterr().err.replace("\u2502", " ").split())
+    assert file.read_text() == "mine\n"
+    assert list(tmp_path.iterdir()) == [file]
 
 
 @pytest.mark.parametrize(

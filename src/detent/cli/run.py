@@ -4,7 +4,7 @@ import json as json_text
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 from cyclopts import Parameter
 
@@ -27,6 +27,9 @@ def run(
     vcd: Path | None = None,
     sr: Path | None = None,
     npz: Path | None = None,
+    steps: Path | None = None,
+    steps_frequency: int = 12_000_000,
+    steps_error: Literal["exact", "1us", "5us", "25us"] = "1us",
     strap: Sequence[str] = (),
     set_: Annotated[Sequence[str], Parameter(name="--set")] = (),
     line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
@@ -55,6 +58,12 @@ def run(
         Write a sigrok session (PulseView, sigrok-cli).
     npz
         Write pulse times and pin changes as NumPy arrays.
+    steps
+        Write the pulses as runs of steps, as a motion board executes them: a CSV file, a run a row.
+    steps_frequency
+        Ticks a second of that board's clock.
+    steps_error
+        How far a pulse may be from its time; exact: on the nearest tick.
     strap
         PIN=LEVEL (low, high, open), or UNIT.PIN=LEVEL for a cell.
     set_
@@ -78,7 +87,9 @@ def run(
         until = None if for_ is None else parse_duration(for_)
         if plot is not None:
             check(plot)
-        wanted = [path for path in (plot, vcd, sr, npz) if path is not None]
+        if steps_frequency < 1:
+            raise ValueError(f"--steps-frequency {steps_frequency}: a clock has 1 tick a second or more, like 12000000")
+        wanted = [path for path in (plot, vcd, sr, npz, steps) if path is not None]
         cell = build(found.description, found.read, record=bool(wanted), line_timing=line_timing)
         lines = [_addressed(cell, text) for text in send]
     except Problem as error:
@@ -91,7 +102,7 @@ def run(
     except (Oscillation, MotorError) as error:
         failed(error)
     try:
-        _write(cell, found, plot=plot, vcd=vcd, sr=sr, npz=npz)
+        _write(cell, found, plot=plot, vcd=vcd, sr=sr, npz=npz, steps=steps, clock=(steps_frequency, steps_error))
     except MotorError as error:
         failed(error)
     except ValueError as error:
@@ -173,12 +184,14 @@ def _run_on(cell: "Cell", until: "Ns | None") -> str:
 
 
 def _write(
-    cell: "Cell", target: "Target", *, plot: Path | None, vcd: Path | None, sr: Path | None, npz: Path | None
-) -> None:
+    cell: "Cell", target: "Target", *, plot: Path | None, vcd: Path | None, sr: Path | None, npz: Path | None,
+    steps: Path | None, clock: tuple[int, str],
+) -> None:  # fmt: skip
     """Write the files that are wanted. Raises ValueError for a wrong choice, OSError."""
-    if plot is None and vcd is None and sr is None and npz is None:
+    if plot is None and vcd is None and sr is None and npz is None and steps is None:
         return
     from detent.outputs import signals
+    from detent.ticks import parse_duration
 
     described = target.description
     seen = signals.of_cell(cell, {name: unit.shaft for name, unit in described.units.items()})
@@ -194,6 +207,14 @@ def _write(
         from detent.outputs import arrays
 
         arrays.write(npz, seen)
+    if steps is not None:
+        from detent.outputs import step_file
+
+        frequency, error = clock
+        try:
+            step_file.write(steps, seen, frequency, "exact" if error == "exact" else parse_duration(error))
+        except ValueError as problem:
+            raise ValueError(f"--steps-frequency {frequency}: {problem}; take a faster clock") from None
     if plot is not None:
         from detent.outputs import figures, rotors
 
