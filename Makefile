@@ -32,9 +32,11 @@ check: $(STAMP)
 bench: $(STAMP)
 	$(PYTHON) -m bench
 
-# What the reference pages take from the tables.
+# What the reference pages take from the tables, and the pages as a site.
 docs: $(STAMP)
 	$(PYTHON) docs/generate.py
+	$(PYTHON) -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	@echo "The documentation is in docs/_build/html/index.html"
 
 lock: $(UV)
 	$(UV) pip compile --universal --generate-hashes --all-extras --python-version 3.11 --no-header --quiet \

@@ -4,6 +4,7 @@ Such a part stands between `<!-- generated: NAME -->` and `<!-- end -->`; `PARTS
 command does in which mode is not copied from a table but asked of the firmware, by sending it.
 """
 
+import json
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
@@ -16,6 +17,7 @@ from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import single
 from detent.cell.parts import PARTS as CELL_PARTS
+from detent.cli import VERBS
 from detent.cli.control import usage
 from detent.cli.models import reference
 from detent.controllers import catalogue
@@ -30,7 +32,7 @@ from detent.pins import LOW, PinDriver
 from detent.ramps.differences import PAPER
 from detent.ramps.rate_generator import CLOCK_HZ
 from detent.ramps.short_movements import Way, choose, movement
-from detent.realtime import verbs
+from detent.realtime import openapi, verbs
 from detent.ticks import show_duration
 
 DOCS: Final = Path(__file__).parent
@@ -49,11 +51,15 @@ def names(text: str) -> list[str]:
 
 def pages() -> list[Path]:
     """All pages."""
-    return sorted(DOCS.rglob("*.md"))
+    return sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)
 
 
 def main() -> None:
     """Rewrite what has changed."""
+    for path, text in ((DOCS / name, make()) for name, make in FILES.items()):
+        if not path.exists() or path.read_text() != text:
+            path.write_text(text)
+            print(f"{path.relative_to(DOCS.parent)} rewritten", file=sys.stderr)
     for path in pages():
         before = path.read_text()
         after = page(before)
@@ -362,6 +368,23 @@ def fault_table() -> str:
     return table(("kind", "where", "arguments", "what"), rows)
 
 
+# -- from the command line itself -----------------------------------------------------------------------------
+
+
+def command_line() -> str:
+    """Every verb with its options, as `--help` has them."""
+    from detent.cli import application
+
+    text = application("*").generate_docs(heading_level=1)
+    text = text[: text.index("\n## detent --install-completion")]  # that names the program that runs
+    return text[text.index("\n## detent ") :].replace("\n* `", "\n- `")
+
+
+def verb_list() -> str:
+    """Every verb with its line of help."""
+    return table(("verb", "what"), ((f"[`{name}`](#detent-{name})", line) for name, (_, line) in VERBS.items()))
+
+
 PARTS: Final[dict[str, Callable[[], str]]] = {
     "addresses": addresses,
     "baud rates": rates,
@@ -391,10 +414,17 @@ PARTS: Final[dict[str, Callable[[], str]]] = {
     "reports of the boards": board_reports,
     "step actions of the boards": board_actions,
     "memory of the boards": board_memory,
+    "command line": command_line,
+    "list of verbs": verb_list,
     "verbs": verb_table,
     "verb arguments": verb_arguments,
     "faults": fault_table,
 }
+
+FILES: Final[dict[str, Callable[[], str]]] = {
+    "reference/control-openapi.json": lambda: json.dumps(openapi.document(), indent=1) + "\n",
+}
+"""Files that are made as a whole."""
 
 if __name__ == "__main__":
     main()

@@ -28,7 +28,7 @@ def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An environment of a wheel, with a pip of its own; tests make it what they need."""
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(tmp_path / "bin" / "python"))
-    monkeypatch.setattr(extras, "distribution", lambda name: Installed(None))
+    monkeypatch.setattr("importlib.metadata.distribution", lambda name: Installed(None))
     monkeypatch.setattr(extras, "find_spec", lambda name: object())
     return tmp_path
 
@@ -52,7 +52,7 @@ def test_a_tool_of_uv_or_pipx_is_installed_anew(prefix: Path) -> None:
 def test_a_checkout_is_set_up_again(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sources = prefix / "with a blank"
     sources.mkdir()
-    monkeypatch.setattr(extras, "distribution", lambda name: Installed(sources))
+    monkeypatch.setattr("importlib.metadata.distribution", lambda name: Installed(sources))
     assert extras.how_to_install("workbench") == f"{prefix}/bin/python -m pip install -e '{sources}[workbench]'"
     (sources / "Makefile").touch()
     assert extras.how_to_install("workbench") == f"make -B -C '{sources}' setup"
@@ -62,7 +62,7 @@ def test_sources_on_the_path_alone_take_the_distribution(prefix: Path, monkeypat
     def absent(name: str) -> Installed:
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr(extras, "distribution", absent)
+    monkeypatch.setattr("importlib.metadata.distribution", absent)
     assert extras.how_to_install().endswith("pip install detent-motion")
 
 

@@ -4,12 +4,12 @@ The distribution is called `detent-motion`; import and command are `detent`. How
 itself was installed, so every message that asks for one is made here.
 """
 
-import json
-import shlex
 import sys
-from importlib.metadata import PackageNotFoundError, distribution
 from importlib.util import find_spec
-from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 DISTRIBUTION = "detent-motion"
 
@@ -41,6 +41,9 @@ def need(extra: str, what: str) -> None:
 
 def how_to_install(extra: str = "") -> str:
     """The command that adds `extra` to this installation, or repairs it: a checkout, uv tool, pipx, an environment."""
+    import shlex  # these take longer to load than most of what Detent needs at every start
+    from pathlib import Path
+
     wanted = f"'{DISTRIBUTION}[{extra}]'" if extra else DISTRIBUTION
     prefix = Path(sys.prefix)
     sources = _sources()
@@ -60,15 +63,18 @@ def _pip() -> str:
     return f"{sys.executable} -m pip install" if find_spec("pip") else f"uv pip install --python {sys.executable}"
 
 
-def _sources() -> Path | None:
+def _sources() -> "Path | None":
     """The folder of the sources, where Detent is installed from one that can be edited."""
+    import json
+    from importlib.metadata import PackageNotFoundError, distribution
+    from pathlib import Path
+    from urllib.parse import urlsplit
+    from urllib.request import url2pathname
+
     try:
         told = json.loads(distribution(DISTRIBUTION).read_text("direct_url.json") or "{}")
     except PackageNotFoundError:
         return None
     if not told.get("dir_info", {}).get("editable"):
         return None
-    from urllib.parse import urlsplit
-    from urllib.request import url2pathname
-
     return Path(url2pathname(urlsplit(told["url"]).path))

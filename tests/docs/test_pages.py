@@ -14,7 +14,7 @@ from detent.cell.description import Problem, parse
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-PAGES = sorted(DOCS.rglob("*.md"))
+PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 GSC200 = (DOCS / "controllers" / "gsc200.md").read_text()
 
@@ -33,6 +33,7 @@ def test_make_docs_would_change_nothing() -> None:
     assert generate.pages() == PAGES
     old = [name for name, page in zip(NAMES, PAGES, strict=True) if generate.page(page.read_text()) != page.read_text()]
     assert not old, "run `make docs`"
+    assert [name for name, make in generate.FILES.items() if (DOCS / name).read_text() != make()] == []
 
 
 def test_every_generated_part_has_its_place() -> None:

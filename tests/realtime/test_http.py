@@ -51,6 +51,21 @@ def http_connection(served: HttpControl) -> http.client.HTTPConnection:
     return http.client.HTTPConnection(served.address.host, served.address.port, timeout=60)
 
 
+def test_the_interface_describes_itself_as_openapi(served: HttpControl) -> None:
+    status, found, _ = ask(served, "GET", "/openapi.json")
+    assert (status, found["openapi"]) == (200, "3.1.0")
+    assert set(found["paths"]) == {"/", *(f"/{name}" for name in verbs.VERBS)}
+    for name, verb in verbs.VERBS.items():
+        path = found["paths"][f"/{name}"]
+        schema = path["post"]["requestBody"]["content"]["application/json"]["schema"]
+        assert set(schema["properties"]) == {p.name for p in verb.parameters}
+        assert set(schema.get("required", [])) == {p.name for p in verb.parameters if p.required}
+        assert ("get" in path) == (not verb.changes)
+    identifiers = [what["operationId"] for path in found["paths"].values() for what in path.values()]
+    assert len(identifiers) == len(set(identifiers))
+    assert ask(served, "POST", "/openapi.json")[0] == 405
+
+
 def raw(served: HttpControl, data: bytes) -> bytes:
     """The whole answer to `data`."""
     with socket.create_connection(served.address[:2], timeout=60) as connected:

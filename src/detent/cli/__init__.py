@@ -2,6 +2,10 @@
 
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cyclopts import App
 
 FAILED = 1
 ASKED_WRONGLY = 2
@@ -29,19 +33,18 @@ VERBS = {
     "table": ("detent.cli.table:table", "Compile a curve into the table of differences of a SUPERSIGMA drive."),
     "size": ("detent.cli.size:size", "Compute supplies and currents for a controller, as its manual does."),
     "wiring": ("detent.cli.wiring:wiring", "Find a motor's windings from the resistances between its leads."),
+    "docs": ("detent.cli.docs:docs", "Open the documentation in a browser, or say where it is."),
     "epics": ("detent.cli.epics:epics", "Serve axes as EPICS motor records by Channel Access, until Ctrl-C."),
 }
 """Each verb's function, and its first line of help, which `detent --help` shows without importing the function."""
 
 
-def main(tokens: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0, 1 (it failed), 2 (it was asked wrongly)."""
-    from cyclopts import App, CycloptsError, Parameter
+def application(asked: str = "") -> "App":
+    """The command line. The verb that is `asked` ("*": each) has its whole help, the others have a line of it."""
+    from cyclopts import App, Parameter
 
     import detent
-    from detent.extras import MissingExtra
 
-    given = list(sys.argv[1:] if tokens is None else tokens)
     app = App(
         name="detent",
         help="Intelligent stepper motor controllers in software, exact to the pulse.",
@@ -52,11 +55,21 @@ def main(tokens: Sequence[str] | None = None) -> None:
     )
     for place, (name, (function, line)) in enumerate(VERBS.items()):
         # A help text given here would replace the function's own, which the verb's --help shows whole.
-        short = {} if name in given[:1] else {"help": line}
+        short = {} if asked in (name, "*") else {"help": line}
         app.command(function, name=name, sort_key=place, **short)
     app.register_install_completion_command()
+    return app
+
+
+def main(tokens: Sequence[str] | None = None) -> None:
+    """Run the command line and exit: 0, 1 (it failed), 2 (it was asked wrongly)."""
+    from cyclopts import CycloptsError
+
+    from detent.extras import MissingExtra
+
+    given = list(sys.argv[1:] if tokens is None else tokens)
     try:
-        app(given)
+        application(given[0] if given else "")(given)
     except CycloptsError:
         sys.exit(ASKED_WRONGLY)
     except MissingExtra as error:

@@ -1,13 +1,11 @@
 """NumPy archives (NPZ): pulse times, positions and pin levels, for `numpy.load`.
 
-| key | dtype | what |
-|---|---|---|
-| `UNIT/step_times` | int64 | ns at which each step pulse begins |
-| `UNIT/step_directions` | int8 | +1 or -1 |
-| `UNIT/positions` | int64 | the commanded position behind each pulse, in steps |
-| `UNIT/PIN/times`, `UNIT/PIN/levels` | int64, int8 | changes: from that time on the pin is 0, 1, or -1 (no supply) |
-| `UNIT/WINDING/times`, `UNIT/WINDING/counts` | int64, int16 | from that time on so many of 256 PWM counts |
-| `meta` | str | JSON: units, their pins and positions at 0, the end in ns, and what the caller adds |
+- ``UNIT/step_times`` (int64): ns at which each step pulse begins
+- ``UNIT/step_directions`` (int8): +1 or -1
+- ``UNIT/positions`` (int64): the commanded position behind each pulse, in steps
+- ``UNIT/PIN/times`` (int64), ``UNIT/PIN/levels`` (int8): from that time on the pin is 0, 1, or -1 (no supply)
+- ``UNIT/WINDING/times`` (int64), ``UNIT/WINDING/counts`` (int16): from that time on so many of 256 PWM counts
+- ``meta`` (str): JSON: units, their pins and positions at 0, the end in ns, and what the caller adds
 
 The first entry of a pin is its level before 0, at time -1. The second axis of a unit is a UNIT of its own, like
 `board.Y`; all pins, and all windings, are with the first. A step clock whose pulses no wire carries to another

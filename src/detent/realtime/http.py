@@ -20,7 +20,7 @@ from typing import Final, Protocol
 from urllib.parse import SplitResult, parse_qsl, urlsplit
 
 import detent
-from detent.realtime import verbs
+from detent.realtime import openapi, verbs
 from detent.realtime.control import Ending
 from detent.realtime.endpoints.endpoint import EndpointError
 from detent.realtime.endpoints.tcp import TcpAddress
@@ -197,6 +197,9 @@ class _Handler(BaseHTTPRequestHandler):
         if url.path == "/":
             self._check_method("GET")
             return _listed()
+        if url.path == "/openapi.json":
+            self._check_method("GET")
+            return openapi.document()
         name = url.path.strip("/")
         if name not in verbs.VERBS:
             error = verbs.unknown("verb", name, tuple(verbs.VERBS))

@@ -42,10 +42,11 @@ def unknown(kind: str, name: str, known: Sequence[str]) -> AskedWrongly:
 
 
 class Kind(NamedTuple):
-    """A kind of argument: how people are told what it takes, and its reader, which raises ValueError or TypeError."""
+    """A kind of argument: what it takes, in words; its reader, which raises ValueError or TypeError; a JSON schema."""
 
     takes: str
     read: Callable[[object], object]
+    schema: Mapping[str, Json]
 
 
 def _text(value: object) -> str:
@@ -100,15 +101,17 @@ def _pace(value: object) -> float | None:
     return None if value is None or str(value).strip().lower() in ("free", "null", "none") else _number(value)
 
 
-TEXT: Final = Kind("text", _text)
-COUNT: Final = Kind("a whole number", _count)
-NATURAL: Final = Kind("a whole number from 0 on", _natural)
-NUMBER: Final = Kind("a number", _number)
-LEVEL: Final = Kind("0, 1, low or high", _level)
-FLAG: Final = Kind("true or false", _flag)
-TIME: Final = Kind('seconds, or a time like "20 ms"', _time)
-PATIENCE: Final = Kind('seconds, at most a day of them, or a time like "20 ms"', _patience)
-PACE: Final = Kind('a number above 0, or "free"', _pace)
+_NUMBER_OR_TEXT: Final[Mapping[str, Json]] = {"oneOf": [{"type": "number"}, {"type": "string"}]}
+
+TEXT: Final = Kind("text", _text, {"type": "string"})
+COUNT: Final = Kind("a whole number", _count, {"type": "integer"})
+NATURAL: Final = Kind("a whole number from 0 on", _natural, {"type": "integer", "minimum": 0})
+NUMBER: Final = Kind("a number", _number, {"type": "number"})
+LEVEL: Final = Kind("0, 1, low or high", _level, {"enum": [0, 1, "low", "high"]})
+FLAG: Final = Kind("true or false", _flag, {"type": "boolean"})
+TIME: Final = Kind('seconds, or a time like "20 ms"', _time, _NUMBER_OR_TEXT)
+PATIENCE: Final = Kind('seconds, at most a day of them, or a time like "20 ms"', _patience, _NUMBER_OR_TEXT)
+PACE: Final = Kind('a number above 0, or "free"', _pace, {"oneOf": [{"type": "number"}, {"const": "free"}]})
 
 
 class Parameter(NamedTuple):

@@ -1,0 +1,44 @@
+"""How the pages become a site: `make docs` writes it to `docs/_build/html`, and takes every warning for an error."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from pygments.lexers import TextLexer
+from sphinx.application import Sphinx
+
+import detent
+
+project = "Detent"
+author = "The Detent authors"
+copyright = "2026, The Detent authors"
+version = release = detent.__version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
+exclude_patterns = ["_build"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+nitpicky = False
+suppress_warnings = ["myst.strikethrough"]
+
+myst_heading_anchors = 4
+myst_enable_extensions = ["deflist", "fieldlist"]
+myst_fence_as_directive = []
+
+default_role = "code"
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_default_options = {"members": True, "show-inheritance": True}
+
+
+def setup(app: Sphinx) -> None:
+    """Diagrams are shown as the text that they are."""
+    app.add_lexer("mermaid", TextLexer)
+
+
+html_theme = "furo"
+html_title = f"Detent {version}"
+html_static_path = ["_static"] if (Path(__file__).parent / "_static").is_dir() else []
+html_show_sourcelink = False
+html_copy_source = False
+html_theme_options = {"navigation_with_keys": True, "footer_icons": []}
