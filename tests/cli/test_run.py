@@ -112,7 +112,7 @@ def test_steps_are_written_as_runs(tmp_path: Path, capsys: pytest.CaptureFixture
     """Each pulse of the run, computed from the rows as they are documented, is within the error of its time."""
     file, arrays = tmp_path / "out.csv", tmp_path / "out.npz"
     words = ["--steps", str(file), "--steps-frequency", "16000000", "--npz", str(arrays)]
-    assert detent("run", "gs-c200", "--send", "-300", *words) == 0
+    assert detent("run", "gs-c200s", "--send", "-300", *words) == 0
     assert str(file) in capsys.readouterr().out
     header, *rows = file.read_text().splitlines()
     assert header == "axis,direction,base,interval,count,add"
@@ -120,12 +120,12 @@ def test_steps_are_written_as_runs(tmp_path: Path, capsys: pytest.CaptureFixture
     for row in rows:
         axis, direction, *numbers = row.split(",")
         base, interval, count, add = map(int, numbers)
-        assert axis == "gs-c200"
+        assert axis == "gs-c200s"
         ticks += [base + k * interval + add * k * (k - 1) // 2 for k in range(1, count + 1)]
         directions += [int(direction)] * count
     kept = np.load(arrays)
-    assert directions == kept["gs-c200/step_directions"].tolist() == [-1] * 300
-    for tick, time in zip(ticks, kept["gs-c200/step_times"].tolist(), strict=True):
+    assert directions == kept["gs-c200s/step_directions"].tolist() == [-1] * 300
+    for tick, time in zip(ticks, kept["gs-c200s/step_times"].tolist(), strict=True):
         assert abs(tick * 1000 - time * 16) <= 16 * 1000
 
 
