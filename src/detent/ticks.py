@@ -9,6 +9,7 @@ Two units, both Python integers of any size:
 A time becomes a nanosecond once, by :func:`round_fixed`, half up.
 """
 
+import re
 from fractions import Fraction
 from typing import TypeAlias
 
@@ -23,7 +24,11 @@ US: Ns = 1_000
 MS: Ns = 1_000_000
 SECOND: Ns = 1_000_000_000
 
+_YEAR = 31_557_600  # s
+
 NEVER: Ns = 1 << 100  # a deadline that does not come: later than any time that can be asked for
+LONGEST_YEARS = 1_000_000
+LONGEST: Ns = LONGEST_YEARS * _YEAR * SECOND  # of durations that can be asked for: many times that is before NEVER
 
 
 def to_fixed(ns: Ns) -> Fixed:
@@ -44,21 +49,27 @@ def round_ratio(numerator: int, denominator: int) -> int:
 _UNITS: dict[str, Ns] = {"ns": 1, "us": US, "ms": MS, "s": SECOND, "min": 60 * SECOND, "h": 3600 * SECOND}
 
 
+_NUMBER = re.compile(r"(\d{1,40}\.?\d{0,40}|\.\d{1,40})(e[+-]?\d{1,2})?", re.ASCII)
+_SHOWN = 40  # characters of a wrong duration
+
+
 def parse_duration(value: str | int | float) -> Ns:
     """Nanoseconds of ``"400 us"``, ``"1.5s"``, ``"2 min"``; a number without a unit is seconds. Exact.
 
-    Raises ValueError with a text that shows how to write it.
+    At most a million years. Raises ValueError with a text that shows how to write it.
     """
-    text = str(value).strip().replace("\N{MICRO SIGN}", "u").replace("\N{GREEK SMALL LETTER MU}", "u")
+    text = str(value if not isinstance(value, int) or abs(value) < LONGEST else LONGEST).strip()
+    text = text.replace("\N{MICRO SIGN}", "u").replace("\N{GREEK SMALL LETTER MU}", "u")
     number = text.rstrip("abcdefghijklmnopqrstuvwxyz")
     unit = text[len(number) :] or "s"
-    try:
-        amount = Fraction(number.strip())
-    except (ValueError, ZeroDivisionError):
-        amount = Fraction(-1)
-    if amount < 0 or unit not in _UNITS or "/" in number:
-        raise ValueError(f"{text!r} is no duration: write it like 1.5 s, 400 us, 20 ms, 2 min or 1 h")
-    return round_ratio((amount * _UNITS[unit]).numerator, (amount * _UNITS[unit]).denominator)
+    found = _NUMBER.fullmatch(number.strip())
+    if found is None or unit not in _UNITS:
+        shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+        raise ValueError(f"{shown!r} is no duration: write it like 1.5 s, 400 us, 20 ms, 2 min or 1 h")
+    amount = Fraction(found[0]) * _UNITS[unit]
+    if amount > LONGEST:
+        raise ValueError(f"{text[:_SHOWN]} is longer than {LONGEST_YEARS} years: give less, in s, min or h")
+    return round_ratio(amount.numerator, amount.denominator)
 
 
 def show_duration(ns: Ns) -> str:
@@ -69,5 +80,7 @@ def show_duration(ns: Ns) -> str:
     if ns < 120 * SECOND:
         return f"{ns / size:.4g} {unit}"
     seconds = round_ratio(ns, SECOND)
+    if seconds >= 4 * _YEAR:
+        return f"{seconds / _YEAR:.4g} years"
     hours, minutes, seconds = seconds // 3600, seconds // 60 % 60, seconds % 60
     return f"{hours} h {minutes} min" if hours else f"{minutes} min {seconds} s"

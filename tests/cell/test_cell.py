@@ -321,3 +321,13 @@ def test_any_number_of_commands_in_one_instant_are_sent_and_replayed() -> None:
     again.run_to(2 * SECOND)
     assert list(made.recording or ()) == list(again.recording or ())
     assert len(made.journal) == 500
+
+
+def test_a_cell_is_not_run_to_a_time_that_it_cannot_reach() -> None:
+    made = cell(ONE)
+    made.run_to(1_000_000 * 31_557_600 * SECOND)
+    with pytest.raises(ValueError, match="this cell runs to"):
+        made.run_to(1 << 100)
+    motor = '[motors.m]\nmotor = "as1010"\nunit = "unit"\nsupply = 24\n'
+    with pytest.raises(ValueError, match="at most"):
+        cell(ONE + motor).run_to(1 << 63)

@@ -178,3 +178,58 @@ def test_a_part_is_no_controller() -> None:
     with pytest.raises(TypeError, match="'d' is not a controller"):
         made.controller("d")
     assert list(made.controllers()) == ["bar"]
+
+
+MOTOR = '[motors.m]\nmotor = "qsh4218-41-10-035"\nunit = "bar"\nsupply = 24\n'
+OWN = '[motors.m]\nunit = "bar"\nsupply = 24\ndata = {{ {} }}\n'
+GOOD = "resistance = 2.0, inductance = 3e-3, current = 1, holding_torque = 0.3, inertia = 5e-6"
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "message"),
+    [
+        (f"[units.bar]\nmodel = 'gs-c200'\nshaft = {'9' * 4000}", "units.bar.shaft", "less than or equal to"),
+        (f"[units.bar]\nmodel = 'gs-c200'\nshaft = {'9' * 5000}", "", "a number of thousands of digits"),
+        ("[units.bar]\nmodel = 'gs-c200'\nsupply = nan", "units.bar.supply", "a finite number"),
+        ("x = " + "[" * 5000 + "]" * 5000, "", "nested too deeply"),
+        ("[units.'a.b']\nmodel = 'gs-c200'", "units.a.b", "'.' in a name would part it"),
+        ("[units.'']\nmodel = 'gs-c200'", "units.''", "a name is 1 to 64 characters"),
+        ('[units."a\\nb"]\nmodel = "gs-c200"', "units.'a\\nb'", "a name is 1 to 64 characters"),
+        (ONE + "[switches.s]\naxis = 'bar'\nfrom = -inf\nto = inf\ndrives = 'bar.HOME'", "switches.s.from", "finite"),
+        (ONE + "[switches.s]\naxis = 'bar'\nat = 1e400\ndrives = 'bar.HOME'", "switches.s.at", "finite"),
+        (ONE + MOTOR + "window = -5", "motors.m.window", "greater than 0"),
+        (ONE + MOTOR + "lead = 0", "motors.m", "lead is the distance that a step moves, and not 0"),
+        (ONE + MOTOR + "load = { inertia = 1e300 }", "motors.m.load.inertia", "less than or equal to"),
+        (ONE + "[[script]]\nat = '1e1000000000 s'\nsend = 'F'", "script[1].at", "is no duration"),
+        (ONE + "[[script]]\nat = 1e22\nsend = 'F'", "script[1].at", "longer than 1000000 years"),
+        (ONE + "[motors.m]\nunit = 'bar'\nsupply = 24", "motors.m", "name the motor with motor = 'NAME'"),
+        (ONE + OWN.format("resistance = 2.0"), "motors.m", "needs inductance, current, holding_torque too"),
+        (ONE + OWN.format("resistence = 2.0"), "motors.m", "did you mean resistance?"),
+        (ONE + OWN.format(GOOD + ", steps = 50.5"), "motors.m", "50.5 steps a turn"),
+        (ONE + OWN.format(GOOD + ", steps = 'many'"), "motors.m", "steps is 'many': give a number"),
+        (ONE + OWN.format(GOOD) + "fitted = true", "motors.m", "fitted is for a named motor"),
+    ],
+)
+def test_what_comes_from_outside_has_a_bound_where_it_comes_in(text: str, key: str, message: str) -> None:
+    with pytest.raises(Problem) as caught:
+        cell(text, FILES)
+    assert (caught.value.file, caught.value.key) == ("cell.toml", key)
+    assert message in caught.value.message
+    assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("data", "steps"), [(GOOD, 200), (GOOD + ", steps = 48", 48), (GOOD + ", steps = 400, detent_torque = 0.01", 400)]
+)
+def test_a_motor_of_ones_own_is_as_good_as_a_named_one(data: str, steps: int) -> None:
+    made = cell(ONE + OWN.format(data) + "load = { friction = 0.01, viscous = 1e-3 }", FILES)
+    made.type("bar", "+40")
+    made.run_to(2_000_000_000)
+    motor = made.parts[made.wiring.names.index("m")]
+    assert motor.rig.motor.steps == steps  # type: ignore[attr-defined]
+    assert motor.place(made.now) == pytest.approx(40, abs=0.1)  # type: ignore[attr-defined]
+
+
+def test_a_named_motor_may_have_other_steps() -> None:
+    made = cell(ONE + MOTOR + "data = { steps = 400 }", FILES)
+    assert made.parts[made.wiring.names.index("m")].rig.motor.steps == 400  # type: ignore[attr-defined]

@@ -478,9 +478,9 @@ class _Builder:
         where = f"units.{name}.{key}"
         try:
             text = self.read(file)
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "it is no text file"
-            raise self.problem(where, f"cannot read {file}: {reason or error}") from None
+        except (OSError, ValueError) as error:  # ValueError: no text, or a name that no file can have
+            reason = getattr(error, "strerror", None) or error
+            raise self.problem(where, f"cannot read {file}: {reason}") from None
         try:
             return assemble(catalogue.language(unit.model), text, file)
         except CatalogueError as error:

@@ -29,7 +29,7 @@ from detent.cell.wiring import Talker, Wiring
 from detent.controllers.device import Controller, Device
 from detent.lines.line import Line
 from detent.pins import Level, Net, PinKind
-from detent.ticks import NEVER, Ns
+from detent.ticks import NEVER, Ns, show_duration
 from detent.uart import Chars
 
 
@@ -77,7 +77,12 @@ class Cell(Delivery):
         return None if at >= NEVER else at
 
     def run_to(self, until: Ns) -> None:
-        """Let everything happen up to and including `until`; then it is `until`."""
+        """Let everything happen up to and including `until`; then it is `until`.
+
+        ValueError for a time that this cell cannot reach: beyond `latest`.
+        """
+        if until > self.latest:
+            raise ValueError(f"this cell runs to {show_duration(self.latest)} at most, and not to {until} ns")
         while (at := self._next()) <= until:
             self._advance(at)
         self.now = max(self.now, until)

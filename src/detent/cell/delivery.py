@@ -55,6 +55,7 @@ class Delivery:
         self.nets = list(nets)
         self.lines = list(lines)
         self.now: Ns = 0
+        self.latest: Ns = min((getattr(part, "latest", NEVER - 1) for part in parts), default=NEVER - 1)
         self.recording = recording
         self._outside = Outside(store)
         self.faults = Faults()

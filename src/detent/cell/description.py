@@ -4,17 +4,37 @@ Every fault becomes a `Problem`: one line with the file, the key and what to do.
 business; this module is given text.
 """
 
+import re
 import tomllib
 from collections.abc import Mapping
 from difflib import get_close_matches
+from reprlib import Repr
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    AliasChoices,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 
 from detent.pins import HIGH, LOW, Level
 from detent.ticks import Ns, parse_duration
 
 MOST_PROBLEMS = 5
+LEAST_LEAD = 1e-9
+MOST_STEPS = 10**15  # farther from 0 no axis stands, and no number of any other meaning is greater
+LONGEST_NAME = 64
+
+_KINDS = ("[key]", "constrained-int", "constrained-float", "int", "float", "str")  # no keys, but what was tried
+_BARE = re.compile(r"[A-Za-z0-9_.$ -]{1,64}")
+
+_shown = Repr()
+_shown.maxstring = _shown.maxother = _shown.maxlong = 60
 
 
 class Problem(ValueError):
@@ -43,13 +63,27 @@ def _list(value: object) -> object:
     return [value] if isinstance(value, str) else value
 
 
+def _name(value: str) -> str:
+    if not value.strip() or value != value.strip() or not value.isprintable() or len(value) > LONGEST_NAME:
+        raise ValueError(f"a name is 1 to {LONGEST_NAME} characters, without blanks around them: choose another")
+    wrong = next((sign for sign in value if sign in ".:=/"), None)
+    if wrong is not None:
+        raise ValueError(
+            f"{wrong!r} in a name would part it where UNIT.PIN, UNIT:LINE or UNIT=FILE is written; leave it out"
+        )
+    return value
+
+
+Name = Annotated[str, AfterValidator(_name)]
+Steps = Annotated[int, Field(ge=-MOST_STEPS, le=MOST_STEPS)]
+Number = Annotated[float, Field(ge=-MOST_STEPS, le=MOST_STEPS)]
 LevelField = Annotated[Level, BeforeValidator(_level)]
 DurationField = Annotated[Ns, BeforeValidator(_duration)]
 Names = Annotated[list[str], BeforeValidator(_list)]
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Unit(_Table):
@@ -58,12 +92,12 @@ class Unit(_Table):
     model: str
     program: str | None = None  # file, loaded into program memory and started when the cell starts
     eeprom: str | None = None  # file, in non-volatile memory unless an image is kept for the unit
-    straps: dict[str, int | str] = {}
-    options: dict[str, int | float | str] = {}
+    straps: dict[str, Steps | str] = {}
+    options: dict[str, Steps | Number | str] = {}
     powered: bool = True  # when the cell starts
-    shaft: int = 0  # where the axis stands when the cell starts, in steps
-    supply: float | None = None  # V, checked against the model's limits
-    loads: dict[str, float] = {}  # A drawn from supply outputs by pin, checked likewise
+    shaft: Steps = 0  # where the axis stands when the cell starts, in steps
+    supply: Number | None = None  # V, checked against the model's limits
+    loads: dict[str, Number] = {}  # A drawn from supply outputs by pin, checked likewise
 
 
 class Wire(_Table):
@@ -79,9 +113,9 @@ class Switch(_Table):
     drives: Names
     level: LevelField = HIGH  # when the cell starts; an axis decides for itself
     axis: str | None = None  # the unit (UNIT.AXIS where it has several), or the motor, whose axis moves the contact
-    start: int | float | None = Field(None, validation_alias=AliasChoices("from"))  # steps; on a motor, its distance
-    end: int | float | None = Field(None, validation_alias=AliasChoices("to"))
-    at: int | None = None  # the same as from and to
+    start: Steps | Number | None = Field(None, validation_alias=AliasChoices("from"))  # steps; on a motor, its distance
+    end: Steps | Number | None = Field(None, validation_alias=AliasChoices("to"))
+    at: Steps | None = None  # the same as from and to
     inside: LevelField = LOW  # the level between from and to
 
     @model_validator(mode="after")
@@ -123,7 +157,7 @@ class Current(_Table):
 class Motor(_Table):
     """``[motors.NAME]``: a motor with drive and load on the axis of a unit, or on step pulses that a wire brings."""
 
-    motor: str
+    motor: str = ""  # by name; without one the `data` are all of it
     unit: str | None = None
     axis: str = ""  # where the unit has several
     supply: float  # V
@@ -134,11 +168,19 @@ class Motor(_Table):
     drop: float = 0.0  # V in the switches
     resistance: float = 0.0  # ohm of switches and wires
     fitted: bool = False  # to the maker's torque curve
-    data: dict[str, float] = {}  # numbers of the motor that are different: SI units
-    load: dict[Literal["inertia", "friction", "viscous", "torque"], float] = {}
-    lead: float | None = None  # distance a step: then places of switches are distances
+    data: dict[str, Steps | Number | str] = {}  # an own motor, or what is different in the named one: SI units
+    load: dict[Literal["inertia", "friction", "viscous", "torque"], Annotated[float, Field(ge=-1e6, le=1e6)]] = {}
+    lead: Number | None = None  # distance a step: then places of switches are distances
     reverse: bool = False  # plus turns the motor the other way
-    window: float = 0.5  # steps that the step detector takes for made
+    window: float = Field(0.5, gt=0, le=4)  # steps that the step detector takes for made
+
+    @model_validator(mode="after")
+    def _known(self) -> "Motor":
+        if not (self.motor or self.data):
+            raise ValueError("name the motor with motor = 'NAME' (detent motor lists them), or give its data")
+        if self.lead is not None and abs(self.lead) < LEAST_LEAD:
+            raise ValueError("lead is the distance that a step moves, and not 0: leave it out to count in steps")
+        return self
 
 
 class Line(_Table):
@@ -180,11 +222,11 @@ class Description(_Table):
     """A whole cell file. `file` is its name in error messages."""
 
     title: str = ""
-    units: dict[str, Unit]
+    units: dict[Name, Unit]
     wires: list[Wire] = []
-    switches: dict[str, Switch] = {}
-    motors: dict[str, Motor] = {}
-    lines: dict[str, Line] = {}
+    switches: dict[Name, Switch] = {}
+    motors: dict[Name, Motor] = {}
+    lines: dict[Name, Line] = {}
     script: list[ScriptEntry] = []
     file: str = ""
 
@@ -201,6 +243,10 @@ def parse(text: str, file: str) -> Description:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise Problem(file, "", f"this is no TOML: {error}") from None
+    except RecursionError:
+        raise Problem(file, "", "its tables and lists are nested too deeply: no key of a cell is") from None
+    except ValueError:  # an integer of more digits than Python reads
+        raise Problem(file, "", "it has a number of thousands of digits: no number of a cell is so long") from None
     if "file" in data:
         raise Problem(file, "file", "there is no such key; remove it")
     return _validate({**data, "file": file}, file)
@@ -222,21 +268,23 @@ def _validate(data: dict[str, Any], file: str) -> Description:
     try:
         return Description.model_validate(data)
     except ValidationError as error:
-        faults = [_fault(item, data) for item in error.errors()]
+        faults = list(dict([_fault(item) for item in error.errors()]).items())  # of a key, the last is enough
         key, message = faults[0]
         more = "".join(f"; {k}: {m}" if k else f"; {m}" for k, m in faults[1:MOST_PROBLEMS])
         left = len(faults) - MOST_PROBLEMS
         raise Problem(file, key, message + more + (f"; and {left} more" if left > 0 else "")) from None
 
 
-def _fault(item: Any, data: dict[str, Any]) -> tuple[str, str]:
+def _fault(item: Any) -> tuple[str, str]:
     """The key and the message of one of pydantic's errors."""
     path: list[str] = []
     for part in item["loc"]:
+        if part in _KINDS:
+            continue
         if isinstance(part, int):
             path[-1] += f"[{part + 1}]"
         else:
-            path.append(str(part))
+            path.append(part if _BARE.fullmatch(part) else _shown.repr(part))
     key = ".".join(path)
     if item["type"] == "extra_forbidden":
         known = _known(item["loc"])
@@ -245,8 +293,8 @@ def _fault(item: Any, data: dict[str, Any]) -> tuple[str, str]:
         return key, f"there is no such key; {hint}there are: {', '.join(known)}"
     if item["type"] == "missing":
         return key, "this key is missing"
-    message = item["msg"].removeprefix("Value error, ")
-    return key, f"{message} (it is {item['input']!r})" if not isinstance(item["input"], dict) else message
+    message = item["msg"].removeprefix("Value error, ").replace("Input should", "it should")
+    return key, f"{message} (it is {_shown.repr(item['input'])})" if not isinstance(item["input"], dict) else message
 
 
 def _known(location: tuple[int | str, ...]) -> list[str]:

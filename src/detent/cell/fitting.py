@@ -1,7 +1,10 @@
 """Motors fitted to a cell: from ``[motors.NAME]`` and the switches on its axis to a `Mechanics`."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, fields
+from difflib import get_close_matches
 from math import inf
+from typing import Any
 
 from detent.cell.contacts import PINS, Contact, Detector
 from detent.cell.description import Description, Motor, Problem, Switch
@@ -46,7 +49,7 @@ def mechanics(
     entry = description.motors[name]
     try:
         model = "" if entry.unit is None else description.units[entry.unit].model
-        rig = _rig(entry, COMMANDED.get(model, ()))
+        rig = _rig(name, entry, COMMANDED.get(model, ()))
         step = GRID // winding(entry.step).steps if "step" in entry.model_fields_set else None
         contacts = [_contact(switch, place, entry) for switch, place in switches.items()]
         detector = Detector(entry.window)
@@ -54,6 +57,33 @@ def mechanics(
                          detector=detector, record=record, step=step)  # fmt: skip
     except MotorError as error:
         raise Problem(description.file, f"motors.{name}", str(error)) from None
+
+
+def rated(name: str, entry: Motor) -> Rated:
+    """The motor that an entry ``[motors.NAME]`` means: the named one, with its own numbers, or all of its own.
+
+    Raises MotorError.
+    """
+    known = {field.name: field for field in fields(Rated) if field.name not in ("name", "title", "source")}
+    given: dict[str, Any] = {}
+    for key, value in entry.data.items():
+        if key not in known:
+            near = get_close_matches(key, known, 1, 0.5)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise MotorError(f"data: a motor has no {key!r}; {hint}there are: {', '.join(known)}")
+        if isinstance(value, str) != isinstance(known[key].default, str):
+            kind = "a word" if isinstance(known[key].default, str) else "a number"
+            raise MotorError(f"data: {key} is {value!r}: give {kind}")
+        given[key] = int(value) if key == "steps" and not isinstance(value, str) and value == int(value) else value
+    if entry.motor:
+        found = fitted(entry.motor).motor if entry.fitted else named(entry.motor)
+        return found.changed(**given) if given else found
+    if entry.fitted:
+        raise MotorError("fitted is for a named motor, whose curve is known; leave it out: the data say what they say")
+    missing = [key for key, field in known.items() if field.default is MISSING and key not in given]
+    if missing:
+        raise MotorError(f"data: a motor of your own needs {', '.join(missing)} too (in SI units: ohm, H, A, Nm)")
+    return Rated(name, **given)
 
 
 def check_names(description: Description, taken: Sequence[str]) -> None:
@@ -67,10 +97,8 @@ def check_names(description: Description, taken: Sequence[str]) -> None:
             raise Problem(description.file, f"switches.{name}", "a pin of every motor has this name: choose another")
 
 
-def _rig(entry: Motor, sequences: tuple[Winding, ...]) -> Rig:
-    found = fitted(entry.motor).motor if entry.fitted else named(entry.motor)
-    if entry.data:
-        found = found.changed(**entry.data)
+def _rig(name: str, entry: Motor, sequences: tuple[Winding, ...]) -> Rig:
+    found = rated(name, entry)
     load = Load(**{str(name): value for name, value in entry.load.items()})  # type: ignore[arg-type]
     current = entry.current
     if isinstance(current, (int, float)):

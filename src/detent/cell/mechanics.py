@@ -43,6 +43,8 @@ class _Wait(NamedTuple):
 class Mechanics:
     """A motor, its drive and its load in a cell; `follow` tells it what the axis of its unit does."""
 
+    latest: Ns = (1 << 62) - 1  # its times are int64: 146 years
+
     def __init__(
         self,
         rig: Rig,

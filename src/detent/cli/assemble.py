@@ -182,8 +182,10 @@ def _print_json(facts: dict[str, Any]) -> None:
 
 
 def _read(file: Path) -> bytes:
+    from detent.realtime.texts import read_whole
+
     try:
-        return file.read_bytes()
+        return read_whole(file)
     except OSError as error:
         raise _asked_wrongly(f"{file}: {error.strerror or error}") from error
 

@@ -180,14 +180,13 @@ def _language(model: str) -> Language[Any]:
 def _assembled(model: str, file: Path) -> Assembly[Any]:
     """The assembled source; every error of it is reported before the program ends."""
     from detent.cli.target import asked_wrongly
+    from detent.realtime.texts import read_text
 
     language = _language(model)
     try:
-        source = file.read_text("utf-8-sig")
+        source = read_text(file)
     except OSError as error:
         asked_wrongly(f"{file}: {error.strerror or error}")
-    except UnicodeDecodeError:
-        asked_wrongly(f"{file}: it is no text in UTF-8")
     try:
         return assemble(language, source, str(file))
     except AssemblyFailed as error:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from detent.cell.description import Description, Problem, parse, single
 from detent.controllers import catalogue
+from detent.realtime.texts import read_text
 
 
 class Target(NamedTuple):
@@ -30,13 +31,11 @@ def target(
     if text.endswith(".toml") or "/" in text:
         path = Path(text)
         try:
-            source = path.read_text()
-        except OSError as error:
-            raise Problem(text, "", f"cannot read it: {error.strerror}") from None
-        except UnicodeDecodeError:
-            raise Problem(text, "", "it is no text file") from None
+            source = read_text(path)
+        except (OSError, ValueError) as error:  # ValueError: a name with a NUL
+            raise Problem(text, "", f"cannot read it: {getattr(error, 'strerror', None) or error}") from None
         description = _with_choices(parse(source, text), straps, options, programs)
-        return Target(description, lambda file: (path.parent / file).read_text(), path.stem)
+        return Target(description, lambda file: read_text(path.parent / file), path.stem)
     try:
         catalogue.model(text)
     except catalogue.CatalogueError as error:
@@ -49,7 +48,7 @@ def target(
         options=dict(_pair("--set", item) for item in options),
         program=programs[0] if programs else None,
     )
-    return Target(description, lambda file: Path(file).read_text(), text)
+    return Target(description, lambda file: read_text(Path(file)), text)
 
 
 def _pair(flag: str, item: str) -> tuple[str, str]:

@@ -16,6 +16,7 @@ from detent.realtime.control import PATIENCE, Control
 from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.images import Images, cell_name
 from detent.realtime.service import Service, models
+from detent.realtime.texts import read_text
 from detent.realtime.verbs import Answer, AskedWrongly
 
 CLOSING: Final = 30.0  # seconds that the serving thread has to end
@@ -231,7 +232,7 @@ class Bench:
         try:
             service = Service(
                 description,
-                lambda file: (beside / file).read_text(),
+                lambda file: read_text(beside / file),
                 wanted,
                 pace=1 if pace is None else pace,
                 line_timing=line_timing,
@@ -277,7 +278,7 @@ class Bench:
         if straps or options or program:
             raise Problem(target, "", "a cell file has its own straps, options and programs: write them there")
         try:
-            text = Path(target).read_text()
+            text = read_text(Path(target))
         except OSError as error:
             raise Problem(target, "", f"cannot read it: {error.strerror}") from None
         return parse(text, target)

@@ -112,7 +112,14 @@ def _motor(description: Description, name: str, motor: Mechanics) -> MotorPictur
     entry = description.motors[name]
     teeth = motor.rig.motor.teeth
     return MotorPicture(
-        name, entry.motor, entry.unit, entry.axis, entry.lead, 4 * teeth, teeth * motor.cycle, motor.contact_names
+        name,
+        entry.motor or motor.rig.motor.name,
+        entry.unit,
+        entry.axis,
+        entry.lead,
+        4 * teeth,
+        teeth * motor.cycle,
+        motor.contact_names,
     )
 
 

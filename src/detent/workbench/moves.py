@@ -1,17 +1,18 @@
 """What the Motion page asks of the server: the law of an axis, a move, and what a motor makes of it (see `motion`)."""
 
 import asyncio
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from detent.cell.description import Description, Problem
 from detent.cell.description import Motor as Fitted
-from detent.cell.description import Problem
+from detent.cell.fitting import rated
 from detent.controllers import catalogue
 from detent.motors.load import Load
 from detent.motors.motor import Motor, MotorError
 from detent.motors.named import MOTORS
-from detent.motors.named import motor as named
 from detent.motors.rotor import Rig
 from detent.realtime.target import target
 from detent.workbench import motion
@@ -77,7 +78,7 @@ class Moves:
             "values": dict(motion.in_force(law, state.registers, axis)),
             "steppings": [winding.name for winding in law.windings],
             "stepping": motion.stepping(law, state.registers),
-            "motors": [_facts(motor) for motor in MOTORS.values()],
+            "motors": [_facts(name, motor) for name, motor in self._motors().items()],
             "fitted": self._fitted(law, unit, axis),
         }  # fmt: skip
 
@@ -99,55 +100,67 @@ class Moves:
         """What a motor makes of a move: its torque over speed, what the move asks of it, and the verdict."""
         law = self._law(wanted.unit, wanted.axis)
         async with self._one:
-            return await asyncio.to_thread(_judged, law, wanted, form)
+            return await asyncio.to_thread(_judged, law, wanted, form, self._motors())
 
     def _fitted(self, law: Law, unit: str, axis: str) -> dict[str, object] | None:
         """The motor that the cell file puts on an axis, as the form has it; None without one."""
-        try:
-            description = target(self._bench.picture.target).description
-        except Problem:
-            return None
-        for name, entry in description.motors.items():
+        described = self._described()
+        for name, entry in described.motors.items() if described is not None else ():
             if entry.unit == unit and (entry.axis == axis or len(self._bench.picture.units[unit].axes) == 1):
-                return {"name": name, **_form(law, entry)}
+                return {"name": name, **_form(law, name, entry)}
         return None
 
+    def _described(self) -> Description | None:
+        try:
+            return target(self._bench.picture.target).description
+        except Problem:
+            return None
 
-def _form(law: Law, entry: Fitted) -> dict[str, object]:
+    def _motors(self) -> dict[str, Motor]:
+        """The motors to choose from: those that are known, and those of the cell that have data of their own."""
+        described = self._described()
+        own = {} if described is None else {n: rated(n, entry) for n, entry in described.motors.items() if entry.data}
+        return {**own, **MOTORS}
+
+
+def _form(law: Law, name: str, entry: Fitted) -> dict[str, object]:
     """The form for a motor as a cell file has it."""
     current = entry.current
     if current is None:
-        amps = named(entry.motor).current
+        amps = rated(name, entry).current
     else:
         amps = current if isinstance(current, int | float) else max(current.run, current.ramp)
     steppings = [winding.name for winding in law.windings]
     load = Load(**{str(name): value for name, value in entry.load.items()})  # type: ignore[arg-type]
     return {
-        "motor": entry.motor, "stepping": entry.step if entry.step in steppings else (steppings or [""])[0],
+        "motor": name if entry.data else entry.motor,
+        "stepping": entry.step if entry.step in steppings else (steppings or [""])[0],
         "supply": entry.supply, "current": amps, "inertia": load.inertia * 1e4, "friction": load.friction,
     }  # fmt: skip
 
 
-def _facts(motor: Motor) -> dict[str, object]:
+def _facts(name: str, motor: Motor) -> dict[str, object]:
     return {
-        "name": motor.name, "title": motor.title, "supply": SUPPLY, "current": motor.current,
+        "name": name, "title": motor.title, "supply": SUPPLY, "current": motor.current,
         "inertia": round((motor.inertia or 1e-5) * 1e4, 5), "torque": motor.holding_torque,
     }  # fmt: skip
 
 
-def _rig(law: Law, form: Form) -> Rig:
+def _rig(law: Law, form: Form, motors: Mapping[str, Motor]) -> Rig:
     windings = {winding.name: winding for winding in law.windings}
     if form.stepping not in windings:
         raise MotorError("the size of these microsteps divides no full step: no motor can be judged with it")
+    if form.motor not in motors:
+        raise MotorError(f"no motor {form.motor!r}; there are: {', '.join(motors)}")
     return motion.rig(
-        named(form.motor), windings[form.stepping], supply=form.supply, current=form.current,
+        motors[form.motor], windings[form.stepping], supply=form.supply, current=form.current,
         inertia=form.inertia * 1e-4, friction=form.friction,
     )  # fmt: skip
 
 
-def _judged(law: Law, wanted: Axis, form: Form) -> dict[str, object]:
+def _judged(law: Law, wanted: Axis, form: Form, motors: Mapping[str, Motor]) -> dict[str, object]:
     """Everything that is shown of a motor. Raises MotorError."""
-    rig = _rig(law, form)
+    rig = _rig(law, form, motors)
     train = law.train(motion.clipped(law, wanted.values), min(wanted.steps, law.most))
     drawn: Picture = motion.picture(train)
     per_step = rig.drive.winding.steps

@@ -1,0 +1,35 @@
+"""Texts that people write: cell files, programs. Read whole, as UTF-8, and never more than a text of theirs can be."""
+
+import errno
+import io
+from pathlib import Path
+
+MOST_BYTES = 16 * 1024 * 1024
+
+
+def read_whole(path: Path, most: int = MOST_BYTES) -> bytes:
+    """The bytes of a file. Raises OSError, also for one that has more than `most`, or never ends."""
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"it is larger than {most >> 20} MiB: no file that is meant here is", str(path))
+    return data
+
+
+def read_text(path: Path) -> str:
+    """The text of a file, its lines ended by a newline each, without the mark that some editors put before UTF-8.
+
+    Raises OSError, whose `strerror` says what is wrong and what to do, also for a file that is no text, or too long
+    to be one.
+    """
+    data = read_whole(path)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line, column = data.count(b"\n", 0, error.start) + 1, error.start - data.rfind(b"\n", 0, error.start)
+        raise OSError(
+            errno.EILSEQ,
+            f"byte {data[error.start]:02X} on line {line}, column {column} is no UTF-8: save it as UTF-8",
+            str(path),
+        ) from None
+    return io.StringIO(text, newline=None).read()
