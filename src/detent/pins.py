@@ -53,11 +53,28 @@ class Pin(NamedTuple):
 
 
 class PulseOutput(NamedTuple):
-    """How step pulses leave a controller: the pin for each direction (+1, -1), `width` ns at level `active`."""
+    """How step pulses leave a controller: the pin for each direction (+1, -1), `width` ns at level `active`.
+
+    `common` is a further pin, if there is one, with the pulses of both directions.
+    """
 
     pins: Mapping[int, str]
     width: Ns
     active: Level
+    common: str = ""
+
+    @property
+    def clocks(self) -> tuple[str, ...]:
+        """Every pin that carries step pulses, once each."""
+        return tuple(dict.fromkeys((*self.pins.values(), *([self.common] if self.common else []))))
+
+    def given_by(self, direction: int) -> tuple[str, ...]:
+        """The pins on which a step in `direction` is a pulse."""
+        return (self.pins[direction], self.common) if self.common else (self.pins[direction],)
+
+    def carries(self, pin: str, direction: int) -> bool:
+        """Whether a step in `direction` is a pulse on `pin`."""
+        return pin in (self.pins[direction], self.common)
 
     def __deepcopy__(self, _: object) -> "PulseOutput":
         return self

@@ -465,12 +465,11 @@ class _Builder:
                 except ImageError as error:
                     raise self.problem(f"units.{name}", f"its stored image is damaged: {error}") from None
         hosts = [entry.host for entry in self.description.lines.values() if entry.host is not None]
-        for name in (*hosts, *(name for name in units if name not in hosts)):  # axes look at PARTY at power-on
-            if units[name].powered:
-                cell.power(name, True)
+        order = (*hosts, *(name for name in units if name not in hosts))  # axes look at PARTY at power-on
+        cell.supply_all([cell.unit(name) for name in order if units[name].powered])
         for name, assembly in programs.items():
             self.controller(name).load(assembly.image, assembly.base, cell.now)
-            cell.start(name)
+        cell.start_all(programs)
 
     def assembled(self, name: str, unit: Unit, key: str) -> Assembly[Any]:
         """The program in the file that `key` of the unit names."""

@@ -6,7 +6,7 @@ after them; then what they did is delivered (`cell.delivery`).
 
 import copy
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from detent.cell.breakage import Fault, find_pin
 from detent.cell.deeds import (
@@ -259,8 +259,13 @@ class Cell(Delivery):
         if not self._acting:
             self._catch_up()
             self._keep(Start(unit))
-        self.controller(unit).start(self.now)
-        self._touched.add(self.unit(unit))
+        self.start_all([unit])
+
+    def start_all(self, units: Iterable[str]) -> None:
+        """Start the programs of several units in one instant: each finds its inputs as they were before."""
+        for unit in units:
+            self.controller(unit).start(self.now)
+            self._touched.add(self.unit(unit))
         self._settle()
 
     def breaks(self, fault: Fault, lasting: Ns | None = None) -> int:

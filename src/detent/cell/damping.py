@@ -75,6 +75,13 @@ class PhaseReversal:
                 for late, name, value in ((-SETUP, "TURN", way), (0, "STEP", LOW), (PULSE, "STEP", HIGH))
             ]
 
+    def take_level(self, pin: str, level: Level, now: Ns) -> None:
+        """The controller is switched on or off: no motion begins or ends, and no step is made."""
+        self.advance(now)
+        self._inputs[pin] = level
+        if pin == "DIR" and self._on and not self._plan:
+            self._driver.set("TURN", level, now)
+
     def stored(self, ok: bool, now: Ns) -> None:
         """It stores nothing."""
 

@@ -1,19 +1,21 @@
 """What reaches whom in one instant: levels over nets, characters over lines, motions to those who follow them.
 
-What the parts did is delivered in rounds, parts in file order, their outputs in the order they were made and never
-merged; what a round causes is delivered in the next. More than `MOST_DELIVERIES` in one instant is an oscillation, and
+What the parts did is delivered in rounds, units in the order of their names and then the others, their outputs in the
+order they were made and never merged; what a round causes is delivered in the next. So the order in the file means
+nothing. More than `MOST_DELIVERIES` in one instant is an oscillation, and
 an error that names its pins.
 """
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from typing import NamedTuple, TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.breakage import Faults, find_pin
 from detent.cell.recording import InputSet, Received, Recording
 from detent.cell.wiring import Wiring
-from detent.controllers.device import Device, DriveSet, Output, Powered, StageSet, StoreImage
+from detent.controllers.device import Device, DriveSet, EdgeSensitive, Output, Powered, StageSet, StoreImage
 from detent.lines.line import EVERYBODY, Line
 from detent.pins import HIGH, LOW, Level, Net, PinSet
 from detent.ticks import NEVER, Ns
@@ -61,11 +63,14 @@ class Delivery:
         self.faults = Faults()
         self._hands: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
         self._supplied: set[int] = set()  # units that are switched on
+        self._driving: set[tuple[int, str]] = set()  # outputs that drive their nets: the others let them float
         self._deadlines: list[Ns] = [NEVER] * len(parts)
         self._line_deadline: Ns = NEVER  # the earliest of all lines
         self._touched: set[int] = set()
         self._instant: Ns = -1
         self._deliveries: Counter[str] = Counter()  # of this instant, by pin
+        by_name = sorted(range(len(parts)), key=lambda part: (part >= wiring.units, wiring.names[part]))
+        self._turn = [by_name.index(part) for part in range(len(parts))]  # whose turn it is in a round
 
     # -- what reaches whom -------------------------------------------------------------------------------
 
@@ -77,7 +82,7 @@ class Delivery:
                 index = touched.pop()
                 self._deliver(index, self._drain(index))
             else:
-                round_ = sorted(touched)
+                round_ = sorted(touched, key=self._turn.__getitem__)
                 touched.clear()
                 for index, out in [(index, self._drain(index)) for index in round_]:
                     self._deliver(index, out)
@@ -100,7 +105,10 @@ class Delivery:
             if kind is PinSet:
                 net = drives.get(item.pin)  # type: ignore[union-attr]
                 if net is not None:
-                    self._drive(net, (index, item.pin), item.level)  # type: ignore[union-attr]
+                    driver = index, item.pin  # type: ignore[union-attr]
+                    begins = driver not in self._driving
+                    self._driving.add(driver)
+                    self._drive(net, driver, item.level, edge=not begins)  # type: ignore[union-attr]
             elif kind is Sent:
                 place = self.wiring.speaks[index].get(item.port)  # type: ignore[union-attr]
                 if place is not None:
@@ -127,15 +135,17 @@ class Delivery:
                     self._touched.add(follower)
                 if not item.on:  # type: ignore[union-attr]
                     for pin, net in drives.items():
-                        self._drive(net, (index, pin), HIGH)
+                        self._driving.discard((index, pin))
+                        self._drive(net, (index, pin), HIGH, edge=False)
 
-    def _drive(self, net: int, driver: tuple[int, str], level: Level) -> None:
+    def _drive(self, net: int, driver: tuple[int, str], level: Level, *, edge: bool = True) -> None:
+        """An output puts a level on its net. That it begins to drive it, or lets go, is no edge."""
         wire = self.nets[net]
         if wire.drive(driver, level):
             for part, pin in self.wiring.reads[net]:
-                self._set_pin(part, pin, wire.level)
+                self._set_pin(part, pin, wire.level, edge=edge)
 
-    def _set_pin(self, index: int, pin: str, level: Level) -> None:
+    def _set_pin(self, index: int, pin: str, level: Level, *, edge: bool = True) -> None:
         if self._instant != self.now:
             self._instant = self.now
             self._deliveries.clear()
@@ -149,7 +159,11 @@ class Delivery:
             )
         if index < self.wiring.units and self.recording is not None:
             self.recording.extend(index, (InputSet(self.now, pin, level),))
-        self.parts[index].set_pin(pin, level, self.now)
+        part = self.parts[index]
+        if not edge and isinstance(part, EdgeSensitive):
+            part.take_level(pin, level, self.now)
+        else:
+            part.set_pin(pin, level, self.now)
         self._touched.add(index)
 
     def _match_line(self, number: int) -> None:
@@ -204,14 +218,36 @@ class Delivery:
     def supply(self, part: int, on: bool) -> None:
         """Switch the supply of a unit, now."""
         if on:
-            self._supplied.add(part)
-        else:
-            self._supplied.discard(part)
-        self.parts[part].power(on, self.now)
+            self.supply_all([part])
+            return
+        self._supplied.discard(part)
+        self.parts[part].power(False, self.now)
         self._touched.add(part)
-        if on:
+        self._settle()
+
+    def supply_all(self, parts: Sequence[int]) -> None:
+        """Switch on several units in one instant: each finds its inputs as all of them drive their wires at first."""
+        for part in parts:
+            if not self.supplied(part):
+                self._put_first_levels(part)
+        for part in parts:
+            self._supplied.add(part)
+            self.parts[part].power(True, self.now)
+            self._touched.add(part)
             self._match_line(self.wiring.line_of[part])
         self._settle()
+
+    def _put_first_levels(self, part: int) -> None:
+        """Put on its nets what a unit without supply will drive them to: a twin of it is switched on to see that."""
+        drives = self.wiring.drives[part]
+        if not drives:
+            return
+        twin = deepcopy(self.parts[part])
+        twin.power(True, self.now)
+        for item in twin.drain():
+            if isinstance(item, PinSet) and item.pin in drives and (part, item.pin) not in self._driving:
+                self._driving.add((part, item.pin))
+                self._drive(drives[item.pin], (part, item.pin), item.level, edge=False)
 
     def supplied(self, part: int) -> bool:
         """Whether a unit is switched on."""

@@ -55,6 +55,11 @@ class StepDetector:
             self._done_at = now + (self.slow_response if slow else self.response)
             self._driver.set("DONE", LOW, now)
 
+    def take_level(self, pin: str, level: Level, now: Ns) -> None:
+        """The controller is switched on or off: it asks for no step."""
+        self.advance(now)
+        self._clock = level
+
     def stored(self, ok: bool, now: Ns) -> None:
         """It stores nothing."""
 

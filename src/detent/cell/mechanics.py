@@ -174,6 +174,14 @@ class Mechanics:
             course.change(sequencer.set_level(self._level(), now), self.trace)
             self._plan(now)
 
+    def take_level(self, pin: str, level: Level, now: Ns) -> None:
+        """Who drives an input is switched on or off: the drive makes no step of it."""
+        if pin == "CLOCK":
+            self.advance(now)
+            self._inputs[pin] = level
+        else:
+            self.set_pin(pin, level, now)
+
     def follow(self, motion: MotionStarted | MotionCut | MotionEnded) -> None:
         """The axis starts, stops or changes its mind."""
         if motion.axis != self.axis:

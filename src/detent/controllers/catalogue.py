@@ -31,7 +31,7 @@ from detent.controllers.supersigma import pins as supersigma_pins
 from detent.controllers.supersigma.firmware import Supersigma
 from detent.controllers.supersigma.phrases import Phrases as SupersigmaPhrases
 from detent.controllers.supersigma.program import LEAST_OFFSET
-from detent.pins import Level, Pin, PinKind
+from detent.pins import Level, Pin
 from detent.ramps import differences
 from detent.ramps.short_movements import Way
 from detent.ticks import US, parse_duration
@@ -135,7 +135,7 @@ def strap_level(found: Configurable, pin: str, value: object) -> Level:
     text = str(value).strip().lower()
     levels = {"0": 0, "low": 0, "1": 1, "high": 1}
     if text == "open":
-        return found.straps[pin] if _pin(found, pin).kind is PinKind.SERIAL else _pin(found, pin).rest
+        return _pin(found, pin).rest
     if isinstance(value, bool) or text not in levels:
         raise CatalogueError(f"strap {pin} cannot be {value!r}; it takes low (0), high (1) or open")
     return levels[text]

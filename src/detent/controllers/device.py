@@ -13,7 +13,7 @@ changes (tables, trains, options) returns itself when copied.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.pins import Level, Pin, PinSet, PulseOutput
@@ -179,6 +179,14 @@ class Device(Protocol):
 
     def watch(self, pin: str) -> None:
         """A wire leads from this pulse output to another device: report its every pulse as `PinSet`."""
+
+
+@runtime_checkable
+class EdgeSensitive(Protocol):
+    """What a device has besides if it acts on the edge of an input, and not on its level alone."""
+
+    def take_level(self, pin: str, level: Level, now: Ns) -> None:
+        """The wire of an input begins to be driven, or is let go, by a supply: the level is new, and it is no edge."""
 
 
 class Controller(Device, Protocol):

@@ -52,6 +52,7 @@ def _about(unit: UnitSignals) -> dict[str, Any]:
         if output is None
         else {
             "pins": {f"{way:+d}": pin for way, pin in output.pins.items()},
+            **({"common": output.common} if output.common else {}),
             "width_ns": output.width,
             "active": output.active,
         },

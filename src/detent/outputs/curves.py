@@ -193,7 +193,7 @@ def _busy_with_pulses(unit: UnitSignals, pin: str, until: Ns, columns: int) -> l
     """The columns in which the pin carries a pulse, joined."""
     output = unit.view.pulse_output
     assert output is not None
-    spans = [span for span in unit.spans if output.pins.get(span.direction) == pin]
+    spans = [span for span in unit.spans if output.carries(pin, span.direction)]
     counts = [0]
     for span in spans:
         counts.append(counts[-1] + span.last - span.first + 1)

@@ -128,7 +128,7 @@ def chosen_lanes(signals: Signals) -> list[Pin | Strip]:
                                 curves.powers(driven, signals.until)))  # fmt: skip
     pins: list[Pin | Strip] = []
     for unit in signals.units:
-        clocks = set(unit.view.pulse_output.pins.values()) if unit.view.pulse_output is not None else set()
+        clocks = set(unit.view.pulse_output.clocks) if unit.view.pulse_output is not None else set()
         quiet = {*clocks, unit.view.port.sends, unit.view.port.receives}
         moving = [pin for pin in unit.pins if pin not in quiet and _changes(unit, pin, signals.until)]
         pins += [Pin(unit.name, pin) for pin in moving[: max((MOST_LANES - len(strips)) // len(signals.units), 2)]]

@@ -113,7 +113,7 @@ class UnitSignals:
         self._until = until
         output = None if log.carries_pulses() else log.view.pulse_output
         self._output = output  # of pulses that are no entries of their own
-        self.unlogged = frozenset(output.pins.values()) if output is not None else frozenset()
+        self.unlogged = frozenset(output.clocks) if output is not None else frozenset()
         self._waves = {pin: self._logged(log, pin) for pin in self.pins}
         self.windings: dict[str, Driven] = {}
 
@@ -228,10 +228,10 @@ class UnitSignals:
 
 def _times_on(pin: str, output: PulseOutput, pulses: Pulses) -> Int64Array:
     """When the pulses begin that this pin carries."""
-    if len(set(output.pins.values())) == 1:
+    ways = [direction for direction in output.pins if output.carries(pin, direction)]
+    if len(ways) == len(output.pins):
         return pulses.times
-    direction = next(direction for direction, name in output.pins.items() if name == pin)
-    times: Int64Array = pulses.times[pulses.directions == direction]
+    times: Int64Array = pulses.times[np.isin(pulses.directions, ways)]
     return times
 
 

@@ -105,7 +105,7 @@ class UnitLog:
         output = self.view.pulse_output
         if output is None:
             return False
-        logged = [self._changes[pin].levels for pin in output.pins.values() if pin in self._changes]
+        logged = [self._changes[pin].levels for pin in output.clocks if pin in self._changes]
         return any(output.active in levels for levels in logged)
 
     def drawn(self) -> dict[str, Pin]:

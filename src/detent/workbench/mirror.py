@@ -123,7 +123,7 @@ class Unit:
                 self.changes[pin.name] = Changes(float(straps.get(pin.name, pin.rest)))
         self.axes = {axis: Axis(view.shaft) for axis in view.axes}
         output = view.pulse_output
-        self.clocks = frozenset(output.pins.values()) if output is not None else frozenset()
+        self.clocks = frozenset(output.clocks) if output is not None else frozenset()
         self.logged = False  # step pulses are entries of their own, because a wire carries them
         self.refused: list[tuple[int, Refused]] = []
 

@@ -142,7 +142,7 @@ class PinCurve:
     def _mine(self, span: Span) -> bool:
         """Whether this pin carries the pulses of a span."""
         output = self._unit.view.pulse_output
-        return output is not None and output.pins[span.direction] == self._pin
+        return output is not None and output.carries(self._pin, span.direction)
 
     def _given(self, times: Int64Array) -> Int64Array:
         """How many pulses the pin has carried up to each time; only differences count."""

@@ -170,6 +170,15 @@ class Dcb274:
         self._poll(now)
         self.advance(now)
 
+    def take_level(self, pin: str, level: Level, now: Ns) -> None:
+        """An input takes a level without an edge: it asks for no step."""
+        if pin in ("STEP", "DIR"):
+            self.advance(now)
+            self._set_inputs.add(pin)
+            self._ports.levels[pin] = level
+        else:
+            self.set_pin(pin, level, now)
+
     def stored(self, ok: bool, now: Ns) -> None:
         """The NV memory was written, or not."""
         self._quiet = False

@@ -120,6 +120,14 @@ class Board:
         self._settle(now)
         self.advance(now)
 
+    def take_level(self, pin: str, level: Level, now: Ns) -> None:
+        """An input takes a level without an edge: NXT and a step request are none then."""
+        if pin == "NXT" or (self._direct.on and pin in pins.SLEWS):
+            self.advance(now)
+            self._inputs[pin] = level
+        else:
+            self.set_pin(pin, level, now)
+
     def stored(self, ok: bool, now: Ns) -> None:
         """It stores nothing."""
 

@@ -147,7 +147,7 @@ class GsC200:
 
     def watch(self, pin: str) -> None:
         """A wire leads from a clock output: give each pulse as an event."""
-        if pin in ("CLOCK", "CW", "CCW"):
+        if pin in self.pulse_output.clocks:
             self._motion.pulses_are_wired()
 
     # -- the controller as seen from outside -------------------------------------------------------------
@@ -159,7 +159,7 @@ class GsC200:
 
     @property
     def pulse_output(self) -> PulseOutput:
-        """CLOCK, or CW and CCW with the circuit of figure 10; low for 1.7 us."""
+        """CLOCK, and CW and CCW beside it with the circuit of figure 10; low for 1.7 us."""
         return pins.SEPARATE_CLOCK_OUTPUT if self._separate_clocks else pins.CLOCK_OUTPUT
 
     @property

@@ -27,13 +27,13 @@ class Course(Enum):
 class Motion:
     """The motion of one module. `deadline` says when to call `advance`; it returns True when a course has ended."""
 
-    __slots__ = ("_axis", "_clock", "_clock_low", "_clock_rises", "_inputs", "_move", "_pins",
+    __slots__ = ("_axis", "_clock", "_clock_rises", "_clocks_low", "_inputs", "_move", "_pins",
                  "_reset_rises", "course", "deadline",
                  "ramp", "slew", "start_stop")  # fmt: skip
 
     def __init__(self, axis: Axis, pins: PinDriver, inputs: dict[str, Level], clock: PulseOutput) -> None:
         self._axis, self._pins, self._inputs, self._clock = axis, pins, inputs, clock
-        self._clock_low = ""  # the clock output that is low for the moment
+        self._clocks_low: tuple[str, ...] = ()  # the clock outputs that are low for the moment
         self.reset()
 
     def reset(self) -> None:
@@ -138,7 +138,8 @@ class Motion:
         """Deal with the deadline `at`. True when the move's last pulse was given."""
         if self._clock_rises <= at:
             self._clock_rises = NEVER
-            self._pins.set(self._clock_low, HIGH, at)
+            for pin in self._clocks_low:
+                self._pins.set(pin, HIGH, at)
             self._plan()
             return False
         if self._reset_rises <= at:
@@ -148,8 +149,9 @@ class Motion:
             return False
         moment, pulse = self._axis.advance(at)
         if self._axis.every_pulse and moment is not Moment.HELD:
-            self._clock_low = self._clock.pins[self._axis.direction]
-            self._pins.set(self._clock_low, LOW, at)
+            self._clocks_low = self._clock.given_by(self._axis.direction)
+            for pin in self._clocks_low:
+                self._pins.set(pin, LOW, at)
             self._clock_rises = at + self._clock.width
         if moment is Moment.END:
             self._finish(at)

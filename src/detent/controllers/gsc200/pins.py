@@ -23,9 +23,9 @@ PINS: tuple[Pin, ...] = (
     Pin("GND", 8, PinKind.SUPPLY, "ground"),
     Pin("REC", 9, _STRAP, "low: recall the stored program at power-on, home, and run it"),
     Pin("TEST", 10, _STRAP, "test only: must be tied to pin 8"),
-    Pin("RXD", 11, PinKind.SERIAL, "received data; its idle level at power-on chooses the homing direction"),
+    Pin("RXD", 11, PinKind.SERIAL, "received data; its idle level at power-on chooses the homing direction", LOW),
     Pin("TXD", 12, PinKind.SERIAL, "transmitted data"),
-    Pin("TXPD", 13, PinKind.SERIAL, "transmitted data pull-down, tied to TXD on the last unit of a line"),
+    Pin("TXPD", 13, PinKind.SERIAL, "transmitted data pull-down: low is tied to TXD (one unit of a line), else open"),
     Pin("RDY", 14, PinKind.OPEN_COLLECTOR, "0 while a command or a program is in execution"),
     Pin("-VSL", 15, PinKind.SUPPLY, "-12 V out, 10 mA"),
     Pin("+VSL", 16, PinKind.SUPPLY, "+12 V out, 10 mA"),
@@ -55,7 +55,7 @@ SEPARATE_CLOCKS: tuple[Pin, ...] = (
 PINS_SEPARATE_CLOCKS: tuple[Pin, ...] = PINS + SEPARATE_CLOCKS
 
 CLOCK_OUTPUT = PulseOutput({1: "CLOCK", -1: "CLOCK"}, CLOCK_LOW_NS, LOW)
-SEPARATE_CLOCK_OUTPUT = PulseOutput({1: "CW", -1: "CCW"}, CLOCK_LOW_NS, LOW)
+SEPARATE_CLOCK_OUTPUT = PulseOutput({1: "CW", -1: "CCW"}, CLOCK_LOW_NS, LOW, "CLOCK")
 
 SERIAL_PORT = SerialPort("RXD", "TXD")
 
@@ -88,13 +88,13 @@ def select(address: int | None) -> dict[str, Level]:
 def strap_line(units: Sequence[tuple[str, Mapping[str, Level]]]) -> list[dict[str, Level]]:
     """The straps of the modules that share a line, from those that are named, in the order of the line.
 
-    TXPD is tied to TXD on exactly one of them, by default the last (pin 13). Several modules need a multipoint
-    address each. Raises ValueError with the unit and the remedy.
+    TXPD is tied to TXD on exactly one of them, where nothing is said of it on the last (pin 13). Several modules need
+    a multipoint address each. Raises ValueError with the unit and the remedy.
     """
-    straps = [{**DEFAULT_STRAPS, **named} for _, named in units]
-    if not any("TXPD" in named for _, named in units):
-        for strapped in straps[:-1]:
-            strapped["TXPD"] = HIGH
+    straps = [{**DEFAULT_STRAPS, "TXPD": HIGH, **named} for _, named in units]
+    silent = [place for place, (_, named) in enumerate(units) if "TXPD" not in named]
+    if silent and all(strapped["TXPD"] == HIGH for strapped in straps):
+        straps[silent[-1]]["TXPD"] = LOW
     names = [name for name, _ in units]
     tied = [name for name, strapped in zip(names, straps, strict=True) if strapped["TXPD"] == LOW]
     if len(tied) != 1:

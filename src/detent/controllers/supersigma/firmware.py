@@ -105,6 +105,17 @@ class Supersigma:
             self._flag(_INTERRUPTS[pin], now)
             self._motion.emergency(now)
 
+    def take_level(self, pin: str, level: Level, now: Ns) -> None:
+        """An input takes a level without an edge. One that is found active while the motor moves stops it all the same.
+
+        At rest nothing is told: nothing was met.
+        """
+        self.advance(now)
+        if pin in self._inputs and self._motion.at_rest:
+            self._inputs[pin] = level
+        else:
+            self.set_pin(pin, level, now)
+
     def stored(self, ok: bool, now: Ns) -> None:
         """The EPROM is not written in the circuit."""
 
