@@ -91,6 +91,11 @@ class Axis:
         """Whether a train is under way, held or not."""
         return self.train is not None
 
+    @property
+    def stepping(self) -> bool:
+        """Whether its next pulse comes by itself: a train is under way, and the gate is open."""
+        return self.train is not None and self._open
+
     def given(self, now: Ns) -> int:
         """How many pulses this motion has given up to and including `now`."""
         if self.train is None:

@@ -129,6 +129,13 @@ Output: TypeAlias = (
 )  # fmt: skip
 
 
+class Stop(NamedTuple):
+    """An input that stops an axis at once if it takes this level, which it has not: no further pulse of this motion."""
+
+    pin: str
+    level: Level
+
+
 class CommandHelp(NamedTuple):
     """A row of a controller's command table as people read it."""
 
@@ -218,6 +225,16 @@ class Controller(Device, Protocol):
 
     def status(self, now: Ns, axis: str = "") -> Status:
         """Where an axis is and what the controller does, at `now`; the first axis unless it is named."""
+
+    def cuts(self, now: Ns, axis: str = "") -> Sequence[Stop]:
+        """The inputs that, changed at `now`, cut the motion of an axis, or hold its next pulse back.
+
+        What slows down first is none of them; nor is anything at rest, or while the pulse is held already. What holds
+        at `now` holds until something happens to the controller, by itself or from outside.
+        """
+
+    def switches(self, axis: str = "") -> Sequence[str]:
+        """The inputs for the switches on the way of an axis: ends of travel, limits, home."""
 
     def frame(self, text: str) -> bytes:
         """The bytes a host sends for the command line `text`: address, checksum and terminator added.

@@ -33,7 +33,7 @@ from detent.controllers.dcb274.running import Running
 from detent.controllers.dcb274.settings import Settings
 from detent.controllers.dcb274.trip import Trip
 from detent.controllers.dcb274.work import Work, position
-from detent.controllers.device import Output, Powered, StageSet, Status, StoreImage
+from detent.controllers.device import Output, Powered, StageSet, Status, Stop, StoreImage
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PulseOutput
 from detent.ticks import NEVER, Ns
 from detent.uart import Char, Format, SerialPort, Transmitter
@@ -275,6 +275,14 @@ class Dcb274:
         else:
             state = "waiting" if self.mode is Mode.WAITING else "ready"
         return Status(motion.position(now), self._axis.pulses_at(now), state)
+
+    def cuts(self, now: Ns, axis: str = "") -> Sequence[Stop]:
+        """The limit ahead unless it is gentle (l 32), and the home switch while it is looked for."""
+        return self._motion.cuts() if self._powered else ()
+
+    def switches(self, axis: str = "") -> Sequence[str]:
+        """Both limits and home."""
+        return ("LIMIT-A", "LIMIT-B", "HOME")
 
     def drive(self, now: Ns) -> current.Drive:
         """Current, decay and step table, as the drive has them at `now`: data for a motor model."""

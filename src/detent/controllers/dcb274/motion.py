@@ -12,6 +12,7 @@ from detent.controllers.dcb274 import settings
 from detent.controllers.dcb274.pins import DIRECTION_HELD, LEAST_STEP_LOW, LEAST_STEP_PERIOD
 from detent.controllers.dcb274.ports import Ports
 from detent.controllers.dcb274.settings import Settings
+from detent.controllers.device import Stop
 from detent.pins import HIGH, LOW, Level
 from detent.pulses import Train, Uniform
 from detent.ramps import timer_table
@@ -270,6 +271,25 @@ class Motion:
         elif self.course is Course.SEEK_HIGH and not low:
             self.halt(now)
         return ENDED if self.at_rest else NOTHING
+
+    def cuts(self) -> list[Stop]:
+        """The levels of limits and home at which `switches_changed` stops the pulses at once."""
+        if not self._axis.stepping:
+            return []
+        levels, found = self._ports.levels, []
+        for pin in ("LIMIT-A", "LIMIT-B", "HOME"):
+            levels[pin] ^= 1
+            if self._cuts_now():
+                found.append(Stop(pin, levels[pin]))
+            levels[pin] ^= 1
+        return found
+
+    def _cuts_now(self) -> bool:
+        """Whether the switches, as they are, end the motion under way without a ramp."""
+        if self._ports.limit(self._axis.direction):
+            return not self._settings.flags & settings.GENTLE
+        low = self._ports.active("HOME")
+        return (self.course is Course.SEEK_LOW and low) or (self.course is Course.SEEK_HIGH and not low)
 
     def advance(self, at: Ns) -> News:
         """Deal with the deadline `at`; a step comes before whatever the outputs do."""

@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any
 
 from detent.axis import Axis
-from detent.controllers.device import DriveSet, Output, Powered, Status
+from detent.controllers.device import DriveSet, Output, Powered, Status, Stop
 from detent.controllers.genstepper import link, pins, reports
 from detent.controllers.genstepper.direct import Direct
 from detent.controllers.genstepper.inputs import FIRST_RATE, STANDARD_RATES, Limits, key
@@ -204,6 +204,30 @@ class Board:
         if self._phase is Phase.READY:
             state = "direct" if self._direct.on else "ready" if motor.idle else "running"
         return Status(motor.position(now), motor.pulses(now), state)
+
+    def cuts(self, now: Ns, axis: str = "") -> Sequence[Stop]:
+        """The resets; a hard limit ahead; and whatever asks for a stop while the motor needs no ramp for it."""
+        axis = axis or AXES[0]
+        motor, inputs = self._motors[axis], self._inputs
+        if self._phase is Phase.OFF or not motor.stepping:
+            return ()
+        found = [Stop(pin, LOW) for pin in ("RST", "VC") if inputs[pin] == HIGH]
+        if self._phase is not Phase.READY:
+            return found
+        limit = self._limits.ahead(axis, motor.direction)
+        if limit is not None and inputs[limit.pin] != limit.level and motor.cut_by_limit(now):
+            found.append(limit)
+        if not self._direct.on and self._order.slew_inputs and motor.stops_at_once(now):
+            for pin in (f"{axis}-", f"{axis}+"):
+                asked = key({**inputs, pin: inputs[pin] ^ 1}, axis)
+                if asked != self._keys[axis] and asked != motor.direction:
+                    found.append(Stop(pin, inputs[pin] ^ 1))
+        return found
+
+    def switches(self, axis: str = "") -> Sequence[str]:
+        """Both limits of the axis."""
+        axis = axis or AXES[0]
+        return (f"L{axis}-", f"L{axis}+")
 
     def duties(self, connector: str, now: Ns) -> Duties:
         """The PWM counts at the connector of an axis."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from detent.controllers.device import Stop
 from detent.controllers.genstepper.pins import LIMITS
 from detent.pins import HIGH, LOW, Level
 
@@ -36,12 +37,19 @@ class Limits:
 
     def meets(self, axis: str, direction: int) -> bool:
         """Whether a step action of `axis` in `direction` runs into its limit, which is latched then."""
-        place = LIMITS.index(f"L{axis}{'+' if direction > 0 else '-'}")
-        blocked, inverted = self._mask >> place & 1, self._mask >> place + 4 & 1
-        if self._off or blocked or self._inputs[LIMITS[place]] != (HIGH if inverted else LOW):
+        stop = self.ahead(axis, direction)
+        if stop is None or self._inputs[stop.pin] != stop.level:
             return False
-        self.latches |= 1 << place
+        self.latches |= 1 << LIMITS.index(stop.pin)
         return True
+
+    def ahead(self, axis: str, direction: int) -> Stop | None:
+        """The limit of `axis` in `direction`, at the level that makes it active; None where it counts for nothing."""
+        pin = f"L{axis}{'+' if direction > 0 else '-'}"
+        place = LIMITS.index(pin)
+        if self._off or self._mask >> place & 1:
+            return None
+        return Stop(pin, HIGH if self._mask >> place + 4 & 1 else LOW)
 
     def report(self) -> int:
         """L: what was latched; it is forgotten then."""

@@ -181,6 +181,22 @@ class Motor:
             self._limit_tick = self._tick(now)
             self.stop(now)
 
+    @property
+    def stepping(self) -> bool:
+        """Whether its next step comes by itself."""
+        return self._axis.stepping
+
+    def stops_at_once(self, now: Ns) -> bool:
+        """Whether a stop that begins at `now` makes no further step."""
+        point = self._point(now)
+        return not stopping(point.phase, point.speed, self.slope, self.keep, self._room(self.direction, now)).steps
+
+    def cut_by_limit(self, now: Ns) -> bool:
+        """Whether a limit ahead that closes at `now` ends the steps with the one before."""
+        if self._limits.hard:
+            return True
+        return self.action in (Action.GOING, Action.SLEWING) and self.stops_at_once(now)
+
     def set_rate(self, rate: int, now: Ns) -> None:
         """R: a plain slew follows at once, anything else from its next motion on."""
         self.rate = rate

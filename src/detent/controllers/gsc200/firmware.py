@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from detent.axis import Axis
-from detent.controllers.device import Output, Powered, Refused, Status, StoreImage
+from detent.controllers.device import Output, Powered, Refused, Status, Stop, StoreImage
 from detent.controllers.gsc200 import commands, pins, program
 from detent.controllers.gsc200.commands import GS_C200S, CommandError, Instruction, Op
 from detent.controllers.gsc200.counter import PositionCounter
@@ -191,6 +191,14 @@ class GsC200:
         else:
             state = "programming" if self._programming else "ready"
         return Status(self._counter.read(now), self._axis.pulses_at(now), state)
+
+    def cuts(self, now: Ns, axis: str = "") -> Sequence[Stop]:
+        """ENABLE; EOT or HOME in the part of homing that looks for it; the input of a velocity move without a ramp."""
+        return self._running.cuts() if self._powered else ()
+
+    def switches(self, axis: str = "") -> Sequence[str]:
+        """EOT and HOME."""
+        return ("EOT", "HOME")
 
     def frame(self, text: str) -> bytes:
         """The command line `text` as a host sends it to this module."""

@@ -7,6 +7,7 @@ it into another move that agrees with the pulses already sent.
 from enum import Enum
 
 from detent.axis import Axis, Marks, Moment
+from detent.controllers.device import Stop
 from detent.controllers.gsc200.pins import RESET_LOW_NS
 from detent.pins import HIGH, LOW, Level, PinDriver, PulseOutput
 from detent.ramps.constant_acceleration import Move, move
@@ -133,6 +134,22 @@ class Motion:
             self.halt(now)
             return True
         return False
+
+    def cuts(self) -> list[Stop]:
+        """ENABLE, and what ends this course of homing ("Home", pins 24, 30, 32); no switch ends a move."""
+        if not self._axis.stepping:
+            return []
+        found = [Stop("ENABLE", LOW)]
+        if self.course is Course.SEEK_EOT:
+            found.append(Stop("EOT", LOW))
+        elif self.course is Course.SEEK_HOME:
+            found.append(Stop("HOME", LOW))
+        return found
+
+    @property
+    def stops_at_once(self) -> bool:
+        """Whether `decelerate` stops it without a ramp."""
+        return self.course is Course.MOVE and self.slew <= self.start_stop
 
     def advance(self, at: Ns) -> bool:
         """Deal with the deadline `at`. True when the move's last pulse was given."""

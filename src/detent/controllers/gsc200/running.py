@@ -7,7 +7,7 @@ reached one instruction time later. What it waits for is explicit: `_timer`, a u
 from collections.abc import Callable
 from typing import ClassVar
 
-from detent.controllers.device import Executing, Finished, Output
+from detent.controllers.device import Executing, Finished, Output, Stop
 from detent.controllers.gsc200.commands import Instruction, Op
 from detent.controllers.gsc200.counter import PositionCounter
 from detent.controllers.gsc200.flow import Flow
@@ -110,6 +110,13 @@ class Running:
             self._waiting = ""
             self.timer = now + self._instruction_time
         return False
+
+    def cuts(self) -> list[Stop]:
+        """What stops the motion at once: the driver's inputs; the input of a velocity move without a ramp."""
+        found = self._motion.cuts()
+        if found and self._waiting and self._motion.stops_at_once and self._inputs[self._waiting] == HIGH:
+            found.append(Stop(self._waiting, LOW))
+        return found
 
     def advance(self, at: Ns) -> None:
         """Deal with the deadline `at`; within one instant pulses come first."""

@@ -10,7 +10,7 @@ from typing import ClassVar, NoReturn
 
 from detent.assembler import ImageError
 from detent.axis import Axis
-from detent.controllers.device import Output, Powered, Refused, Status
+from detent.controllers.device import Output, Powered, Refused, Status, Stop
 from detent.controllers.supersigma import commands, link, pins
 from detent.controllers.supersigma.commands import Command, Op
 from detent.controllers.supersigma.link import Link
@@ -186,6 +186,14 @@ class Supersigma:
         course = self._motion.course
         state = "off" if not self._powered else "homing" if self._motion.originating else course.value
         return Status(self._axis.shaft_at(now) - self._origin, self._axis.pulses_at(now), state)
+
+    def cuts(self, now: Ns, axis: str = "") -> Sequence[Stop]:
+        """The limit switch in origination; in movements it brakes, as excessive force does."""
+        return self._motion.cuts() if self._powered else ()
+
+    def switches(self, axis: str = "") -> Sequence[str]:
+        """The limit switch at the end of the rail."""
+        return (pins.RAIL,)
 
     def frame(self, text: str) -> bytes:
         """The message that `text` says, in words or in hex. Raises ValueError with a remedy."""

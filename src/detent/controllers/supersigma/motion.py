@@ -3,6 +3,7 @@
 from enum import Enum
 
 from detent.axis import Axis, Moment
+from detent.controllers.device import Stop
 from detent.controllers.supersigma import pins
 from detent.controllers.supersigma.program import Program
 from detent.pins import HIGH, LOW, Level, PinDriver
@@ -110,6 +111,14 @@ class Motion:
             self._rest(now)
             return True
         return False
+
+    def cuts(self) -> list[Stop]:
+        """The edge of the limit switch that origination waits for; all other stops brake."""
+        if not self._axis.stepping:
+            return []
+        if self.course is Course.TO_SWITCH:
+            return [Stop(pins.RAIL, LOW)]
+        return [Stop(pins.RAIL, HIGH)] if self.course is Course.FROM_SWITCH else []
 
     def cut(self, now: Ns) -> None:
         """The supply fails."""
