@@ -43,7 +43,7 @@ def test_a_move_is_judged_and_drawn(capsys: pytest.CaptureFixture[str], tmp_path
     assert set(facts["sensitivity"]) == {"inertia", "friction", "voltage"}
     assert picture.stat().st_size > 10_000
     assert "no step lost" in said(capsys, *move, "--slew", "3000", "--sensitivity")
-    assert "full steps lost" in said(capsys, *move, "--slew", "9000", "--inertia", "1e-4")
+    assert "steps lost: the rotor falls" in said(capsys, *move, "--slew", "9000", "--inertia", "1e-4")
 
 
 def test_pull_in_tells_the_start_stop_speed_and_the_holes_of_resonance(capsys: pytest.CaptureFixture[str]) -> None:

@@ -54,7 +54,7 @@ def test_a_supply_below_the_windings_need_is_refused_with_what_it_could_drive() 
             Drive(wrong, 1.0)
     with pytest.raises(MotorError, match="current factor"):
         Drive(24, 1.0, currents=Currents(rest=-1))
-    with pytest.raises(MotorError, match="no decay 'quick'; there are: fast, slow, auto, voltage"):
+    with pytest.raises(MotorError, match="no decay 'quick'; there are: fast, slow, mixed, auto, voltage"):
         Drive(24, 1.0, decay="quick")  # type: ignore[arg-type]
 
 

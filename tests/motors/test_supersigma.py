@@ -17,7 +17,7 @@ from detent.motors.load import Load
 from detent.motors.move import simulate
 from detent.motors.named import motor
 from detent.motors.rotor import FINE, Rig
-from detent.motors.variants import changed, judge
+from detent.motors.variants import changed, judge, loss_rate
 from detent.motors.winding import HALF
 from detent.pulses import Train
 from detent.ramps.constant_acceleration import move
@@ -58,6 +58,8 @@ def test_15000_the_required_speed_needs_half_the_voltage() -> None:
 def test_it_does_not_hang_on_one_number() -> None:
     """Inertia, friction and torque 20 percent either way, the supply 10."""
     base, train = rig(160, parallel=True), supersigma(27_000, 20_000)
+    many = loss_rate(train, base, tried=96)
+    assert (many.lost, many.corners_lost, many.corners) == (0, 0, 128)
     one_by_one = [("inertia", 0.8), ("inertia", 1.2), ("friction", 0.5), ("friction", 2.0), ("torque_constant", 0.9),
                   ("torque_constant", 1.1), ("voltage", 0.9), ("voltage", 1.1)]  # fmt: skip
     verdicts = judge(train, [changed(base, **{name: factor}) for name, factor in one_by_one])
@@ -67,10 +69,16 @@ def test_it_does_not_hang_on_one_number() -> None:
 def test_the_worst_moment_lies_where_the_ramp_turns_into_constant_speed() -> None:
     """Figure 5, shaded: "this is a critical region where losses of synchronisation may occur"."""
     loaded = replace(rig(160, parallel=True), load=Load(inertia=1e-3, viscous=5e-3))
-    smooth = simulate(supersigma(15_000, 10_000), loaded).verdict
     steps = round((650 + 15_000) / 2 * RAMP)
-    sharp = simulate(move(650, 15_000, steps, 10_000).train, loaded).verdict
-    assert not smooth.lost
-    assert 0.95 * 2567 < smooth.worst_pulse < 1.05 * 2567  # na = 2567 half steps
-    assert 0.95 * steps < sharp.worst_pulse < 1.05 * steps
-    assert sharp.load_angle > smooth.load_angle
+    runs = [
+        simulate(train, loaded, sample=MS // 20)
+        for train in (supersigma(15_000, 10_000), move(650, 15_000, steps, 10_000).train)
+    ]
+    assert not any(run.verdict.lost for run in runs)
+    worst = []
+    for run in runs:
+        later = run.times > 0.1  # the start from rest is a shock of its own
+        at = int(np.argmax(np.abs(run.load_angles[later])))
+        assert 0.2 < run.times[later][at] < 0.36  # the ramp ends at 0.3 s
+        worst.append(float(np.abs(run.load_angles[later]).max()))
+    assert worst[1] > worst[0]

@@ -163,11 +163,12 @@ class Motor(_Table):
     supply: float  # V
     current: float | Current | None = None  # A in each phase with both on; the motor's rating
     step: str = "half"
-    decay: Literal["fast", "slow", "auto", "voltage"] = "fast"
+    decay: Literal["fast", "slow", "mixed", "auto", "voltage"] = "fast"
     threshold: float = 0.0  # full steps/s from which on decay is fast (auto)
     drop: float = 0.0  # V in the switches
     resistance: float = 0.0  # ohm of switches and wires
     fitted: bool = False  # to the maker's torque curve
+    damping: Number | None = None  # ratio of the bare rotor; None: the motor's own, or what is usual with the drive
     data: dict[str, Steps | Number | str] = {}  # an own motor, or what is different in the named one: SI units
     load: dict[Literal["inertia", "friction", "viscous", "torque"], Annotated[float, Field(ge=-1e6, le=1e6)]] = {}
     lead: Number | None = None  # distance a step: then places of switches are distances

@@ -9,6 +9,7 @@ from typing import Any
 from detent.cell.contacts import PINS, Contact, Detector
 from detent.cell.description import Description, Motor, Problem, Switch
 from detent.cell.mechanics import Mechanics
+from detent.motors.damping import Damping, given
 from detent.motors.drive import Currents, Drive
 from detent.motors.fit import fitted
 from detent.motors.load import Load
@@ -114,7 +115,7 @@ def _rig(name: str, entry: Motor, sequences: tuple[Winding, ...]) -> Rig:
     if sequences:
         return _commanded(entry, found, load, sequences, amps)
     return Rig(found, Drive(entry.supply, amps, winding(entry.step), entry.decay, entry.threshold, currents, entry.drop,
-                            entry.resistance), load)  # fmt: skip
+                            entry.resistance), load, damping=_damping(entry))  # fmt: skip
 
 
 def _commanded(entry: Motor, found: Rated, load: Load, sequences: tuple[Winding, ...], amps: float) -> Rig:
@@ -132,7 +133,11 @@ def _commanded(entry: Motor, found: Rated, load: Load, sequences: tuple[Winding,
         if "current" not in given:
             amps = (entry.supply - entry.drop) / (found.resistance + entry.resistance)
     drive = Drive(entry.supply, amps, finest, decay, entry.threshold, drop=entry.drop, resistance=entry.resistance)
-    return Rig(found, drive, load, sequences=sequences)
+    return Rig(found, drive, load, sequences=sequences, damping=_damping(entry))
+
+
+def _damping(entry: Motor) -> Damping | None:
+    return None if entry.damping is None else given(entry.damping, "from the cell file")
 
 
 def _contact(name: str, entry: Switch, motor: Motor) -> Contact:

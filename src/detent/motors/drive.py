@@ -2,7 +2,9 @@
 
 * ``fast``: a chopper whose current may fall against the full supply (ideal: no ripple);
 * ``slow``: a chopper that lets the current fall through the winding alone: it cannot follow a falling current, and
-damps; * ``auto``: slow below `decay_threshold`, fast above, slow at standstill (DCB-274, command b);
+damps;
+* ``mixed``: fast for `fast_part` of each off-time and slow for the rest: a falling current has that part of the supply;
+* ``auto``: slow below `decay_threshold`, fast above, slow at standstill (DCB-274, command b);
 * ``voltage``: pulse width without current feedback (Norberg's boards): the duty gives `current` at standstill.
 """
 
@@ -14,10 +16,11 @@ from detent.motors.motor import Motor, MotorError, Shared, need
 from detent.motors.winding import HALF, Winding
 from detent.ticks import NEVER, SECOND, Ns, round_ratio
 
-Decay: TypeAlias = Literal["fast", "slow", "auto", "voltage"]
+Decay: TypeAlias = Literal["fast", "slow", "mixed", "auto", "voltage"]
 
-FAST, SLOW, VOLTAGE = 0, 1, 2  # as the kernel knows them
-_MODES = {"fast": FAST, "slow": SLOW, "auto": SLOW, "voltage": VOLTAGE}
+FAST, SLOW, VOLTAGE, MIXED = 0, 1, 2, 3  # as the kernel knows them
+_MODES = {"fast": FAST, "slow": SLOW, "mixed": MIXED, "auto": SLOW, "voltage": VOLTAGE}
+MOST_SUPPLY = 1000.0  # V: no drive for step motors has more
 
 
 class Currents(NamedTuple):
@@ -44,9 +47,16 @@ class Drive(Shared):
     currents: Currents = STEADY
     drop: float = 0.0  # V lost in the switches
     resistance: float = 0.0  # ohm of switches and wires
+    fast_part: float = 0.3  # of the off-time, for `mixed`
+    least_on: float = 0.0  # of each period, for `mixed`: blanking; a current below what that gives is not reached
+    interpolation: bool = False  # the drive passes evenly from one place of the table to the next, a step behind
+    name: str = ""  # of a drive that is known by name
 
     def __post_init__(self) -> None:
-        need("drive", 0, open_=True, supply=self.supply, current=self.current)
+        need("drive", 0, MOST_SUPPLY, open_=True, supply=self.supply)
+        need("drive", 0, 1000, open_=True, current=self.current)
+        need("drive", 0, 1, fast_part=self.fast_part)
+        need("drive", 0, 0.5, least_on=self.least_on)
         need("drive", 0, drop=self.drop, resistance=self.resistance, decay_threshold=self.decay_threshold)
         if self.decay not in _MODES:
             raise MotorError(f"drive: no decay {self.decay!r}; there are: {', '.join(_MODES)}")
@@ -63,6 +73,11 @@ class Drive(Shared):
     def volts(self) -> float:
         """What the winding can get."""
         return self.supply - self.drop
+
+    @property
+    def fall(self) -> float:
+        """`mixed`: the least mean voltage against a current that shall fall, as a part of `volts`; -1 is all of it."""
+        return self.least_on - (1 - self.least_on) * self.fast_part
 
     @property
     def mode(self) -> int:

@@ -7,7 +7,11 @@ hardware rounds alike.
 Phase frame; x = p theta is the electrical angle::
 
     L di/dt = v - R i - e        e = Kt w (-sin x, cos x)
-    J dw/dt = Kt (ib cos x - ia sin x) - Td sin 4x - B w - Tc sgn w - TL(t, theta)
+    J dw/dt = Kt (ib cos x - ia sin x) - Td sin 4x - B w - Tc sgn w - TL(t, theta) + D (w_pulses - w)
+
+D = D0 k / (1 + (w_pulses / w1)**2) is the damping about the speed of the pulses (`damping`), k the factor on the
+current: windings without current damp nothing. That speed is the way of the
+last pulse over the time it took since the one before; when no pulse has come for longer, over the time that has passed.
 
 *Exponential midpoint*: over one substep the EMF is that of the predicted middle, the winding is solved exactly, and
 the rotor gets the torque of the mean current; Coulomb friction sticks exactly. Substeps are `h` long from the last
@@ -22,23 +26,26 @@ from math import floor
 X, W, IA, IB, ACC, LEVEL, WORST, ELECTRIC, COPPER, MECHANIC, X_NEXT, W_NEXT, ACC_NEXT = range(13)
 FLOATS = 13
 # n, the state in integers
-NOW, PLACE, ROW, MODE, PULSES, WORST_PULSE, LOST_PULSE, STEP, TRACED, NEXT_TRACE, TAKEN = range(11)
-INTEGERS = 11
+# (PULSED: time of the last pulse, GAP: since the one before, FROM: the place before it)
+(NOW, PLACE, ROW, MODE, PULSES, WORST_PULSE, LOST_PULSE, PULSED, GAP, FROM, STEP, TRACED, NEXT_TRACE,
+ TAKEN) = range(14)  # fmt: skip
+INTEGERS = 14
 # par, what does not change
 (R, L, KT, TEETH, J, B, TC, TL, TD, VOLTS, AMPS, PITCH, OFFSET, T_START, T_STEP, P_START, P_STEP, SAMPLE,
- GAIN) = range(19)  # fmt: skip
-PARAMETERS = 19
+ GAIN, DAMPING, ROLL_OFF, FALL, GLIDE) = range(23)  # fmt: skip
+PARAMETERS = 23
 # a row of the trace
 T_COLUMN, X_COLUMN, W_COLUMN, IA_COLUMN, IB_COLUMN, PHI_COLUMN = range(6)
 COLUMNS = 6
 
 DONE, CROSSED, BROKEN = range(3)  # what `advance` returns
 
-PIO2_HIGH = 1.5707963267341256  # the first 33 bits of pi / 2
-PIO2_LOW = 6.0771005065061922e-11
-TWO_OVER_PI = 0.6366197723675814
+TURN_HIGH = 6.2831853069365025  # the first 33 bits of 2 pi
+TURN_LOW = 2.4308402026024769e-10
+ONE_TURN = 0.15915494309189535
 TWO_PI = 6.283185307179586
 FAR = 1 << 62
+LONG_AGO = 1 << 60  # ns, of the pulse before the first
 
 
 def advance(  # type: ignore[no-untyped-def]
@@ -107,6 +114,13 @@ def advance(  # type: ignore[no-untyped-def]
     many_traces = len(trace)
     sample = int(par[SAMPLE])
     gain = float(par[GAIN])  # V that a voltage drive gives for an ampere asked of it
+    damping = float(par[DAMPING])  # Nm s/rad
+    roll_off = float(par[ROLL_OFF])  # rad/s
+    fall = float(par[FALL])  # of a mixed decay: the least voltage against a current, as a part of the supply
+    glide = float(par[GLIDE])  # 1: the drive passes from place to place in the time of a pulse
+    pulsed = int(n[PULSED])
+    gap = int(n[GAP])
+    previous = int(n[FROM])
     half_teeth = 0.5 * teeth
 
     count = len(times)
@@ -137,6 +151,9 @@ def advance(  # type: ignore[no-untyped-def]
         at = place % cycle
         want_a = amps * level * float(table_a[row, at])
         want_b = amps * level * float(table_b[row, at])
+        way = (place - previous) * pitch / teeth * 1e9
+        even = way / gap
+        damps = level / (1.0 + (even / roll_off) * (even / roll_off))
         delta = abs(phi - x)
         if delta > worst:
             worst = delta
@@ -167,49 +184,75 @@ def advance(  # type: ignore[no-untyped-def]
                 pushed = h_over_j / (1.0 + b_half)
                 half_h = 0.5 * h
                 turned = half_teeth * h
+            passed = t + 0.5 * step - pulsed
+            if passed > gap:  # the next pulse is late
+                even = way / passed
+                damps = level / (1.0 + (even / roll_off) * (even / roll_off))
+            elif glide > 0.0:
+                before = previous % cycle
+                part = 1.0 - passed / gap
+                want_a = (
+                    amps
+                    * level
+                    * (float(table_a[row, at]) + part * (float(table_a[row, before]) - float(table_a[row, at])))
+                )
+                want_b = (
+                    amps
+                    * level
+                    * (float(table_b[row, at]) + part * (float(table_b[row, before]) - float(table_b[row, at])))
+                )
+            if glide > 0.0 and passed > gap:
+                want_a = amps * level * float(table_a[row, at])
+                want_b = amps * level * float(table_b[row, at])
             # the middle of the substep, predicted
             wm = w + half_h * acc
             xm = x + turned * (w + 0.5 * half_h * acc)
-            turns = float(floor(xm * TWO_OVER_PI + 0.5))
-            y = (xm - turns * PIO2_HIGH) - turns * PIO2_LOW
+            turns = float(floor(xm * ONE_TURN + 0.5))
+            y = 0.25 * ((xm - turns * TURN_HIGH) - turns * TURN_LOW)
             y2 = y * y
             sine = y - y * y2 * (1 / 6 - y2 * (1 / 120 - y2 * (1 / 5040 - y2 * (1 / 362880 - y2 * (
-                1 / 39916800 - y2 * (1 / 6227020800 - y2 * (1 / 1307674368000)))))))  # fmt: skip
+                1 / 39916800 - y2 * (1 / 6227020800))))))  # fmt: skip
             cosine = 1.0 - y2 * (0.5 - y2 * (1 / 24 - y2 * (1 / 720 - y2 * (1 / 40320 - y2 * (1 / 3628800 - y2 * (
-                1 / 479001600 - y2 * (1 / 87178291200 - y2 * (1 / 20922789888000))))))))  # fmt: skip
-            pairs = float(floor(turns * 0.5))
-            odd = turns - 2.0 * pairs
-            half = pairs - 2.0 * float(floor(pairs * 0.5))
-            flip = 1.0 - 2.0 * half
-            sn = flip * (odd * cosine + (1.0 - odd) * sine)
-            cs = flip * ((1.0 - odd) * cosine - odd * sine)
+                1 / 479001600 - y2 * (1 / 87178291200)))))))  # fmt: skip
+            # of a quarter of the angle; doubled twice
+            twice = 2.0 * sine * cosine
+            rest = 1.0 - 2.0 * sine * sine
+            sn = 2.0 * twice * rest
+            cs = 1.0 - 2.0 * twice * twice
             ea = -kt * wm * sn
             eb = kt * wm * cs
-            # what the drive gives
+            # what the drive gives, beyond what the EMF and the resistance take
+            base_a = ea + r * ia
+            base_b = eb + r * ib
             if mode == 2:
-                va = want_a * gain
-                vb = want_b * gain
+                ua = want_a * gain - base_a
+                ub = want_b * gain - base_b
             else:
-                va = ea + r * ia + (want_a - ia) * per_g
-                vb = eb + r * ib + (want_b - ib) * per_g
                 least_a = -volts
                 most_a = volts
                 least_b = -volts
                 most_b = volts
-                if mode == 1:
-                    if want_a >= 0.0:
-                        least_a = 0.0
-                    if want_a <= 0.0:
-                        most_a = 0.0
-                    if want_b >= 0.0:
-                        least_b = 0.0
-                    if want_b <= 0.0:
-                        most_b = 0.0
-                va = min(max(va, least_a), most_a)
-                vb = min(max(vb, least_b), most_b)
+                if mode == 1 or mode == 3:
+                    lowest = 0.0
+                    if mode == 3:
+                        lowest = fall * volts
+                    if want_a > 0.0:
+                        least_a = lowest
+                    elif want_a < 0.0:
+                        most_a = -lowest
+                    else:
+                        least_a = min(lowest, 0.0)
+                        most_a = -least_a
+                    if want_b > 0.0:
+                        least_b = lowest
+                    elif want_b < 0.0:
+                        most_b = -lowest
+                    else:
+                        least_b = min(lowest, 0.0)
+                        most_b = -least_b
+                ua = min(max((want_a - ia) * per_g, least_a - base_a), most_a - base_a)
+                ub = min(max((want_b - ib) * per_g, least_b - base_b), most_b - base_b)
             # the windings, exactly
-            ua = va - ea - r * ia
-            ub = vb - eb - r * ib
             mean_a = ia + ua * q
             mean_b = ib + ub * q
             torque = kt * (mean_b * cs - mean_a * sn)
@@ -227,7 +270,7 @@ def advance(  # type: ignore[no-untyped-def]
                 rest = place_in - first
                 loaded += float(by_position[first]) + rest * (float(by_position[first + 1]) - float(by_position[first]))
             cogging = td * 4.0 * sn * cs * (cs * cs - sn * sn)
-            wn = w * slowed + pushed * (torque - cogging - loaded)
+            wn = w * slowed + pushed * (torque - cogging - loaded + damping * damps * (even - wm))
             wn = max(wn - d, 0.0) + min(wn + d, 0.0)
             xn = x + turned * (w + wn)
             if not abs(wn) < 1e7:
@@ -242,7 +285,7 @@ def advance(  # type: ignore[no-untyped-def]
                 break
             da = ua * g
             db = ub * g
-            electric += h * (va * mean_a + vb * mean_b)
+            electric += h * ((ua + base_a) * mean_a + (ub + base_b) * mean_b)
             copper += h * r * (mean_a * mean_a + mean_b * mean_b + (da * da + db * db) * (1 / 12))
             mechanic += half_h * torque * (w + wn)
             ia += da
@@ -270,6 +313,9 @@ def advance(  # type: ignore[no-untyped-def]
             break
         if int(places[event]) != place:
             pulses += 1
+            gap = end - pulsed
+            pulsed = end
+            previous = place
         place = int(places[event])
         level = float(levels[event])
         row = int(rows[event])
@@ -293,6 +339,9 @@ def advance(  # type: ignore[no-untyped-def]
     n[PULSES] = pulses
     n[WORST_PULSE] = worst_pulse
     n[LOST_PULSE] = lost_pulse
+    n[PULSED] = pulsed
+    n[GAP] = gap
+    n[FROM] = previous
     n[TRACED] = traced
     n[NEXT_TRACE] = next_trace
     n[TAKEN] = event

@@ -1,6 +1,6 @@
 """What hangs on the shaft: inertia, friction, and a torque that may depend on time and place."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import NamedTuple
 
@@ -53,6 +53,14 @@ class Load(Shared):
     def is_steady(self) -> bool:
         """Whether the torque depends on nothing."""
         return len(self.torque_by_time.values) == len(self.torque_by_position.values) == 1
+
+    def pulled(self, factor: float) -> "Load":
+        """With every torque of it multiplied."""
+        by_time, by_position = (
+            profile._replace(values=tuple(value * factor for value in profile.values))
+            for profile in (self.torque_by_time, self.torque_by_position)
+        )
+        return replace(self, torque=self.torque * factor, torque_by_time=by_time, torque_by_position=by_position)
 
     def at_rest(self) -> float:
         """The torque at the start."""

@@ -13,20 +13,24 @@ from numba import njit, prange
 from detent.motors.kernel import (
     ACC,
     AMPS,
+    DAMPING,
+    FALL,
     FAR,
     GAIN,
+    GLIDE,
     IA,
     IB,
     KT,
     OFFSET,
-    PIO2_HIGH,
-    PIO2_LOW,
+    ONE_TURN,
     PITCH,
+    ROLL_OFF,
     TC,
     TD,
     TEETH,
     TL,
-    TWO_OVER_PI,
+    TURN_HIGH,
+    TURN_LOW,
     TWO_PI,
     VOLTS,
     J,
@@ -37,7 +41,7 @@ from detent.motors.kernel import (
 )  # fmt: skip
 from detent.motors.kernel import B as VISCOUS
 
-LANES = 16
+LANES = 32
 WORST, WORST_PULSE, LOST_PULSE = 5, 6, 7  # rows of the state, behind X, W, IA, IB, ACC
 ROWS = 8
 NEVER_LOST = 1e300
@@ -54,6 +58,9 @@ def advance_lanes(  # type: ignore[no-untyped-def]
     row,
     mode,
     pulses,
+    pulsed,
+    gap,
+    previous,
     times,
     places,
     levels,
@@ -63,10 +70,14 @@ def advance_lanes(  # type: ignore[no-untyped-def]
     table_a,
     table_b,
     substep,
+    halt,
 ):
-    """Go on with the lanes from `lane` on, in `state` (rows by lanes), to `until`; see `kernel.advance`."""
+    """Go on with the lanes from `lane` on, in `state` (rows by lanes), to `until`; see `kernel.advance`.
+
+    `halt`: stop, soon, where one of them is lost.
+    """
     # one block of memory: so the compiler sees that no row overlaps another
-    lanes = np.empty((24, LANES))
+    lanes = np.empty((34, LANES))
     x = lanes[0]
     w = lanes[1]
     ia = lanes[2]
@@ -91,6 +102,10 @@ def advance_lanes(  # type: ignore[no-untyped-def]
     per_g = lanes[21]
     slowed = lanes[22]
     pushed = lanes[23]
+    damping = lanes[24]
+    damped = lanes[25]
+    worst_then = lanes[26]
+    kept = lanes[27:33]  # g to pushed of a whole substep
     for i in range(LANES):
         x[i] = state[X, lane + i]
         w[i] = state[W, lane + i]
@@ -104,6 +119,11 @@ def advance_lanes(  # type: ignore[no-untyped-def]
         r[i] = par[R, lane + i]
         td[i] = par[TD, lane + i] * 4.0
         loaded[i] = par[TL, lane + i]
+        damping[i] = par[DAMPING, lane + i]
+    roll_off = par[ROLL_OFF, lane]
+    teeth = par[TEETH, lane]
+    fall = par[FALL, lane]
+    glide = par[GLIDE, lane]
     half_teeth = 0.5 * par[TEETH, lane]
     pitch = par[PITCH, lane]
     offset = par[OFFSET, lane]
@@ -111,6 +131,7 @@ def advance_lanes(  # type: ignore[no-untyped-def]
     count = len(times)
     event = 0
     cached = -1
+    whole_known = False
     h = 0.0
     per_h = 0.0
     half_h = 0.0
@@ -129,28 +150,26 @@ def advance_lanes(  # type: ignore[no-untyped-def]
         feedback = 1.0
         if mode == 2:
             feedback = 0.0
-        both = 1.0  # a chopper whose voltage takes both signs
+        lowest = -1.0  # of the supply, against a current that shall fall
         if mode == 1:
-            both = 0.0
+            lowest = 0.0
+        elif mode == 3:
+            lowest = fall
+        at_zero = min(lowest, 0.0)
+        way = (place - previous) * pitch / teeth * 1e9
+        even = way / gap
+        damps = level / (1.0 + (even / roll_off) * (even / roll_off))
+        fresh = True
         for i in range(LANES):
-            amps = par[AMPS, lane + i] * level
-            volts = par[VOLTS, lane + i]
-            wa = amps * table_a[row, at]
-            wb = amps * table_b[row, at]
-            want_a[i] = wa
-            want_b[i] = wb
-            positive_a = 1.0 if wa > 0.0 else both
-            negative_a = 1.0 if wa < 0.0 else both
-            positive_b = 1.0 if wb > 0.0 else both
-            negative_b = 1.0 if wb < 0.0 else both
-            least_a[i] = feedback * -volts * negative_a + (1.0 - feedback) * wa * par[GAIN, lane + i]
-            most_a[i] = feedback * volts * positive_a + (1.0 - feedback) * wa * par[GAIN, lane + i]
-            least_b[i] = feedback * -volts * negative_b + (1.0 - feedback) * wb * par[GAIN, lane + i]
-            most_b[i] = feedback * volts * positive_b + (1.0 - feedback) * wb * par[GAIN, lane + i]
-            delta = abs(phi - x[i])
-            worst_pulse[i] = pulse if delta > worst[i] else worst_pulse[i]
-            worst[i] = max(delta, worst[i])
-            lost_pulse[i] = min(lost_pulse[i], pulse if delta > TWO_PI else NEVER_LOST)
+            worst_then[i] = worst[i]
+            worst[i] = max(abs(phi - x[i]), worst[i])
+            damped[i] = damping[i] * damps
+        if halt:
+            first = NEVER_LOST
+            for i in range(LANES):
+                first = min(first, lost_pulse[i])
+            if first < NEVER_LOST:
+                break
         while t < stop:
             step = stop - t
             if step >= substep:
@@ -163,7 +182,8 @@ def advance_lanes(  # type: ignore[no-untyped-def]
                 per_h = 1.0 / h
                 half_h = 0.5 * h
                 turned = half_teeth * h
-                for i in range(LANES):
+                known = step == substep and whole_known
+                for i in range(0 if known else LANES):
                     ell = par[L, lane + i]
                     j = par[J, lane + i]
                     z = h * r[i] / ell
@@ -177,50 +197,91 @@ def advance_lanes(  # type: ignore[no-untyped-def]
                     per_g[i] = 1.0 / g[i]
                     slowed[i] = (1.0 - b_half) / (1.0 + b_half)
                     pushed[i] = h_over_j / (1.0 + b_half)
+                if known:
+                    for k in range(6):
+                        for i in range(LANES):
+                            lanes[18 + k, i] = kept[k, i]
+                elif step == substep:
+                    whole_known = True
+                    for k in range(6):
+                        for i in range(LANES):
+                            kept[k, i] = lanes[18 + k, i]
+            passed = t + 0.5 * step - pulsed
+            part = 0.0
+            if passed > gap:  # the next pulse is late
+                even = way / passed
+                damps = level / (1.0 + (even / roll_off) * (even / roll_off))
+                for i in range(LANES):
+                    damped[i] = damping[i] * damps
+            elif glide > 0.0:
+                part = 1.0 - passed / gap
+            if fresh or glide > 0.0:
+                before = previous % cycle
+                asked_a = table_a[row, at]
+                asked_b = table_b[row, at]
+                if part > 0.0:
+                    asked_a = table_a[row, at] + part * (table_a[row, before] - table_a[row, at])
+                    asked_b = table_b[row, at] + part * (table_b[row, before] - table_b[row, at])
+                for i in range(LANES):
+                    amps = par[AMPS, lane + i] * level
+                    volts = par[VOLTS, lane + i]
+                    wa = amps * asked_a
+                    wb = amps * asked_b
+                    want_a[i] = wa
+                    want_b[i] = wb
+                    low_a = lowest if wa > 0.0 else (-1.0 if wa < 0.0 else at_zero)
+                    high_a = lowest if wa < 0.0 else (-1.0 if wa > 0.0 else at_zero)
+                    low_b = lowest if wb > 0.0 else (-1.0 if wb < 0.0 else at_zero)
+                    high_b = lowest if wb < 0.0 else (-1.0 if wb > 0.0 else at_zero)
+                    least_a[i] = feedback * volts * low_a + (1.0 - feedback) * wa * par[GAIN, lane + i]
+                    most_a[i] = feedback * -volts * high_a + (1.0 - feedback) * wa * par[GAIN, lane + i]
+                    least_b[i] = feedback * volts * low_b + (1.0 - feedback) * wb * par[GAIN, lane + i]
+                    most_b[i] = feedback * -volts * high_b + (1.0 - feedback) * wb * par[GAIN, lane + i]
+                fresh = False
             for i in range(LANES):
                 wm = w[i] + half_h * acc[i]
                 xm = x[i] + turned * (w[i] + 0.5 * half_h * acc[i])
-                turns = np.floor(xm * TWO_OVER_PI + 0.5)
-                y = (xm - turns * PIO2_HIGH) - turns * PIO2_LOW
+                turns = np.floor(xm * ONE_TURN + 0.5)
+                y = 0.25 * ((xm - turns * TURN_HIGH) - turns * TURN_LOW)
                 y2 = y * y
                 sine = y - y * y2 * (1 / 6 - y2 * (1 / 120 - y2 * (1 / 5040 - y2 * (1 / 362880 - y2 * (
-                    1 / 39916800 - y2 * (1 / 6227020800 - y2 * (1 / 1307674368000)))))))  # fmt: skip
+                    1 / 39916800 - y2 * (1 / 6227020800))))))  # fmt: skip
                 cosine = 1.0 - y2 * (0.5 - y2 * (1 / 24 - y2 * (1 / 720 - y2 * (1 / 40320 - y2 * (1 / 3628800 - y2 * (
-                    1 / 479001600 - y2 * (1 / 87178291200 - y2 * (1 / 20922789888000))))))))  # fmt: skip
-                pairs = np.floor(turns * 0.5)
-                odd = turns - 2.0 * pairs
-                half = pairs - 2.0 * np.floor(pairs * 0.5)
-                flip = 1.0 - 2.0 * half
-                sn = flip * (odd * cosine + (1.0 - odd) * sine)
-                cs = flip * ((1.0 - odd) * cosine - odd * sine)
+                    1 / 479001600 - y2 * (1 / 87178291200)))))))  # fmt: skip
+                twice = 2.0 * sine * cosine
+                rest = 1.0 - 2.0 * sine * sine
+                sn = 2.0 * twice * rest
+                cs = 1.0 - 2.0 * twice * twice
                 ea = -kt[i] * wm * sn
                 eb = kt[i] * wm * cs
-                va = ea + r[i] * ia[i] + (want_a[i] - ia[i]) * per_g[i]
-                vb = eb + r[i] * ib[i] + (want_b[i] - ib[i]) * per_g[i]
-                va = min(max(va, least_a[i]), most_a[i])
-                vb = min(max(vb, least_b[i]), most_b[i])
-                ua = va - ea - r[i] * ia[i]
-                ub = vb - eb - r[i] * ib[i]
+                # what the drive gives, beyond what the EMF and the resistance take
+                base_a = ea + r[i] * ia[i]
+                base_b = eb + r[i] * ib[i]
+                ua = min(max((want_a[i] - ia[i]) * per_g[i], least_a[i] - base_a), most_a[i] - base_a)
+                ub = min(max((want_b[i] - ib[i]) * per_g[i], least_b[i] - base_b), most_b[i] - base_b)
                 mean_a = ia[i] + ua * q[i]
                 mean_b = ib[i] + ub * q[i]
                 torque = kt[i] * (mean_b * cs - mean_a * sn)
                 cogging = td[i] * sn * cs * (cs * cs - sn * sn)
-                wn = w[i] * slowed[i] + pushed[i] * (torque - cogging - loaded[i])
+                wn = w[i] * slowed[i] + pushed[i] * (torque - cogging - loaded[i] + damped[i] * (even - wm))
                 wn = max(wn - d[i], 0.0) + min(wn + d[i], 0.0)
                 x[i] = x[i] + turned * (w[i] + wn)
                 ia[i] = ia[i] + ua * g[i]
                 ib[i] = ib[i] + ub * g[i]
                 acc[i] = (wn - w[i]) * per_h
                 w[i] = wn
-                delta = abs(phi - x[i])
-                worst_pulse[i] = pulse if delta > worst[i] else worst_pulse[i]
-                worst[i] = max(delta, worst[i])
-                lost_pulse[i] = min(lost_pulse[i], pulse if delta > TWO_PI else NEVER_LOST)
+                worst[i] = max(abs(phi - x[i]), worst[i])
             t += step
+        for i in range(LANES):
+            worst_pulse[i] = pulse if worst[i] > worst_then[i] else worst_pulse[i]
+            lost_pulse[i] = min(lost_pulse[i], pulse if worst[i] > TWO_PI else NEVER_LOST)
         if not whole:
             break
         if places[event] != place:
             pulse += 1.0
+            gap = end - pulsed
+            pulsed = end
+            previous = place
         place = places[event]
         level = levels[event]
         row = rows[event]
@@ -248,6 +309,9 @@ def advance_all(  # type: ignore[no-untyped-def]
     row,
     mode,
     pulses,
+    pulsed,
+    gap,
+    previous,
     times,
     places,
     levels,
@@ -257,11 +321,13 @@ def advance_all(  # type: ignore[no-untyped-def]
     table_a,
     table_b,
     substep,
+    halt,
 ):
     """`advance_lanes` for every group of lanes in `state`. The time reached is that of each group."""
     groups = state.shape[1] // LANES
     ends = [0] * groups
     for group in prange(groups):
-        ends[group] = advance_lanes(state, par, group * LANES, now, place, level, row, mode, pulses, times, places,
-                                    levels, rows, modes, until, table_a, table_b, substep)  # fmt: skip
+        ends[group] = advance_lanes(state, par, group * LANES, now, place, level, row, mode, pulses, pulsed,
+                                    gap, previous, times, places, levels, rows, modes, until, table_a, table_b,
+                                    substep, halt)  # fmt: skip
     return ends[0]

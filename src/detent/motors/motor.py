@@ -39,6 +39,14 @@ def need(owner: str, least: float, below: float = inf, /, *, open_: bool = False
             raise MotorError(f"{owner}: {word} is {value!r}: give a number {bound}{most}")
 
 
+_WIRED = {  # resistance, inductance, current, holding torque; those in series are 1
+    "series": (1.0, 1.0, 1.0, 1.0),
+    "parallel": (0.25, 0.25, 2.0, 1.0),
+    "unipolar": (0.5, 0.25, sqrt(2), sqrt(0.5)),
+}
+WIRINGS = tuple(_WIRED)
+
+
 @dataclass(frozen=True, slots=True)
 class Motor(Shared):
     """A two-phase hybrid or permanent-magnet step motor, one rotor and two windings.
@@ -58,6 +66,9 @@ class Motor(Shared):
     steps: int = 200  # full steps in a turn
     inductance_factor: float = 1.0
     viscous: float = 0.0  # Nm s/rad
+    damping: float | None = None  # ratio of the bare rotor, measured; None: nobody knows
+    accuracy: float = 0.0  # of a step's place, as a part of a full step; it does not add up
+    wiring: str = ""  # series, parallel or unipolar, of a motor that can be wired otherwise
     title: str = field(default="", compare=False)
     source: str = field(default="", compare=False)
 
@@ -66,6 +77,11 @@ class Motor(Shared):
              current=self.current, holding_torque=self.holding_torque)  # fmt: skip
         need(f"motor {self.name}", 0, detent_torque=self.detent_torque, viscous=self.viscous)
         need(f"motor {self.name}", 0.1, 10, inductance_factor=self.inductance_factor)
+        need(f"motor {self.name}", 0, 0.25, accuracy=self.accuracy)
+        if self.damping is not None:
+            need(f"motor {self.name}", 0, 2, damping=self.damping)
+        if self.wiring not in ("", *WIRINGS):
+            raise MotorError(f"motor {self.name}: no wiring {self.wiring!r}; there are: {', '.join(WIRINGS)}")
         if self.inertia is not None:
             need(f"motor {self.name}", 0, open_=True, inertia=self.inertia)
         if not isinstance(self.steps, int) or self.steps < 4 or self.steps % 4:
@@ -112,10 +128,29 @@ class Motor(Shared):
         """Hz of small swings about a rest position with `inertia` on the shaft: sqrt(p Th / J) / 2 pi."""
         return sqrt(self.teeth * self.holding_torque / (self.rotor + inertia)) / (2 * pi)
 
+    def wired(self, wiring: str) -> "Motor":
+        """The same motor with its windings in ``series``, in ``parallel``, or half of each used (``unipolar``).
+
+        With the turns in series as 1: parallel has a quarter of R and L at twice the current and the same torque;
+        half a winding has half of R and a quarter of L, sqrt(2) of the current (the same heat), 1/sqrt(2) of the
+        torque. MotorError for another word, and where the motor's data do not say how it is wired.
+        """
+        if wiring not in WIRINGS:
+            raise MotorError(f"no wiring {wiring!r}; there are: {', '.join(WIRINGS)}")
+        if not self.wiring:
+            raise MotorError(
+                f"motor {self.name}: its data do not say how its windings are connected (four leads stay as they are): "
+                "give its numbers with wiring = 'series', 'parallel' or 'unipolar'"
+            )
+        now, then = _WIRED[self.wiring], _WIRED[wiring]
+        ohms, henries, amps, torque = (b / a for a, b in zip(now, then, strict=True))
+        return replace(self, name=f"{self.name} ({wiring})" if wiring != self.wiring else self.name, wiring=wiring,
+                       resistance=self.resistance * ohms, inductance=self.inductance * henries,
+                       current=self.current * amps, holding_torque=self.holding_torque * torque)  # fmt: skip
+
     def in_parallel(self) -> "Motor":
         """The windings in parallel that are in series here: R and L a quarter, twice the current, the same torque."""
-        return replace(self, name=f"{self.name} (parallel)", resistance=self.resistance / 4,
-                       inductance=self.inductance / 4, current=self.current * 2)  # fmt: skip
+        return replace(self, wiring="series").wired("parallel")
 
     def changed(self, **changes: Any) -> "Motor":
         """The same motor with other numbers."""

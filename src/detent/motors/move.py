@@ -15,11 +15,12 @@ import numpy as np
 from detent.motors import engine, kernel
 from detent.motors.excitation import Int64, Sequencer
 from detent.motors.motor import MotorError
-from detent.motors.rotor import Floats, Rig, Rotor, substeps
+from detent.motors.rotor import Floats, Rig, Rotor, substeps, swing_of
 from detent.pulses import Train
 from detent.ticks import MS, Ns, show_duration
 
 SETTLE: Ns = 40 * MS
+STILL = 0.02  # full steps: a rotor that swings by less is at rest
 CHUNK = 1 << 16
 MOST_SUBSTEPS = 20_000_000_000  # hours, even compiled
 
@@ -47,19 +48,35 @@ class Verdict(NamedTuple):
     lost_pulse: int | None  # the pulse after which the load angle passed 360 degrees
     slip: int  # whole electrical turns between command and rotor in the end; + the rotor is behind
     error: float  # command less rotor in the end, full steps
+    swing: float = 0.0  # how far the rotor still swings in the end either way, full steps
 
     @property
     def steps_lost(self) -> int:
         """Full steps that the rotor is behind (negative: ahead) for good."""
         return 4 * self.slip
 
+    @property
+    def resting(self) -> bool:
+        """Whether the rotor had come to rest in the end."""
+        return self.swing < STILL
+
+    @property
+    def where_it_rests(self) -> str:
+        """Where the rotor is in the end, in words."""
+        if not self.resting:
+            return f"still swings by {self.swing:.2g} full steps either way"
+        side = "behind" if self.error >= 0 else "ahead"
+        return f"rests {abs(self.error):.2f} full steps {side}"
+
     def __str__(self) -> str:
         if not self.lost:
             return (
                 f"no step lost; largest load angle {self.load_angle:.0f} of 360 degrees, after pulse {self.worst_pulse}"
             )
-        where = f", first after pulse {self.lost_pulse}" if self.lost_pulse is not None else ""
-        return f"{abs(self.steps_lost)} full steps lost{where}" if self.slip else f"lost and caught again{where}"
+        # how many steps behind is not said: it hangs on the last digit of every number, and is no use to anybody
+        if self.lost_pulse is not None:
+            return f"steps lost: the rotor falls a whole electrical turn (4 steps) behind after pulse {self.lost_pulse}"
+        return "steps lost: the rotor stops a whole electrical turn (4 steps) or more from its command"
 
 
 class Energies(NamedTuple):
@@ -147,18 +164,19 @@ def simulate(
 
 def verdict(rotor: Rotor) -> Verdict:
     """The verdict on a rotor that has had time to settle."""
-    winding = rotor.rig.drive.winding
+    winding, s, par = rotor.rig.drive.winding, rotor.s, rotor.rig.parameters
     delta = winding.angle(int(rotor.n[kernel.PLACE])) - rotor.angle
-    worst, lost_pulse = float(rotor.s[kernel.WORST]), int(rotor.n[kernel.LOST_PULSE])
-    return judged(delta, worst, int(rotor.n[kernel.WORST_PULSE]), lost_pulse)
+    worst, lost_pulse = float(s[kernel.WORST]), int(rotor.n[kernel.LOST_PULSE])
+    swing = float(swing_of(s[kernel.W], s[kernel.ACC], par, rotor.rig.drive.current))
+    return judged(delta, worst, int(rotor.n[kernel.WORST_PULSE]), lost_pulse, swing)
 
 
-def judged(delta: float, worst: float, worst_pulse: int, lost_pulse: int) -> Verdict:
-    """The verdict from the last and the largest load angle (rad)."""
+def judged(delta: float, worst: float, worst_pulse: int, lost_pulse: int, swing: float) -> Verdict:
+    """The verdict from the last and the largest load angle, and the swing that is left (el. rad)."""
     slip = round(delta / (2 * pi))
     return Verdict(
         worst > 2 * pi or slip != 0, 1 - worst / (2 * pi), degrees(worst), worst_pulse,
-        None if lost_pulse < 0 else lost_pulse, slip, delta / (pi / 2),
+        None if lost_pulse < 0 else lost_pulse, slip, delta / (pi / 2), swing / (pi / 2),
     )  # fmt: skip
 
 

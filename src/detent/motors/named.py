@@ -19,10 +19,12 @@ LDO = "LDO-42STH48-2504AC sheet, as listed by its maker"
 
 def _motor(
     name: str, title: str, source: str, amps: float, ohms: float, millihenry: float, torque: float,
-    gram_cm2: float | None = None, detent: float = 0.0,
+    gram_cm2: float | None = None, detent: float = 0.0, wiring: str = "",
 ) -> Motor:  # fmt: skip
     inertia = None if gram_cm2 is None else gram_cm2 * 1e-7
-    return Motor(name, ohms, millihenry * 1e-3, amps, torque, inertia, detent, title=title, source=source)
+    return Motor(
+        name, ohms, millihenry * 1e-3, amps, torque, inertia, detent, wiring=wiring, title=title, source=source
+    )
 
 
 MOTORS: dict[str, Motor] = {
@@ -37,8 +39,10 @@ MOTORS: dict[str, Motor] = {
         _motor("as1030", "NEMA 23", BECKHOFF, 1.5, 0.80, 3.8, 0.60, 210),
         _motor("as1050", "NEMA 23", BECKHOFF, 5.0, 0.28, 0.86, 1.2, 360),
         _motor("as1060", "NEMA 34", BECKHOFF, 5.0, 0.36, 2.8, 5.0, 3000, 0.18),
-        _motor("23-305-ds8a-series", "NEMA 23, windings in series", HOBBYCNC, 2.12, 2.8, 12.8, 3.0),
-        _motor("23-305-ds8a-parallel", "NEMA 23, windings in parallel", HOBBYCNC, 4.2, 0.7, 3.2, 3.0),
+        _motor("23-305-ds8a-series", "NEMA 23, windings in series", HOBBYCNC, 2.12, 2.8, 12.8, 3.0, wiring="series"),
+        _motor(
+            "23-305-ds8a-parallel", "NEMA 23, windings in parallel", HOBBYCNC, 4.2, 0.7, 3.2, 3.0, wiring="parallel"
+        ),
     )
 }
 

@@ -1,13 +1,14 @@
 """One motor with its drive and its load, in motion: the state of the equations, and what can be asked of it."""
 
 from dataclasses import dataclass, field
-from math import asin, atan2, ceil, floor, hypot, inf, pi
+from math import asin, atan2, ceil, floor, hypot, inf, pi, sqrt
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from detent.motors import engine, kernel
+from detent.motors.damping import Damping, checked, given, usual
 from detent.motors.drive import Drive
 from detent.motors.excitation import Changes, Sequencer
 from detent.motors.load import NO_LOAD, Load
@@ -21,6 +22,19 @@ FINE: Ns = 10 * US  # for verdicts that are printed
 Floats = npt.NDArray[np.float64]
 
 
+def limit_of(resistance: Any, inductance: Any, inertia: Any, teeth: Any, torque_constant: Any, current: float) -> Any:
+    """S: a substep must be short beside the winding's time constant, and beside the rotor's swing; arrays, too."""
+    swing = np.sqrt(teeth * torque_constant * sqrt(2) * current / inertia)
+    swing = np.maximum(np.maximum(swing, torque_constant / np.sqrt(inertia * inductance)), 1e-9)  # ... and its EMF
+    return np.minimum(0.5 * inductance / resistance, 0.1 / swing)
+
+
+def swing_of(speed: Any, acceleration: Any, par: Any, current: float) -> Any:
+    """The amplitude (el. rad) of the small swing that has this speed and acceleration of the shaft; arrays, too."""
+    square = par[kernel.TEETH] * par[kernel.KT] * sqrt(2) * current / par[kernel.J]
+    return par[kernel.TEETH] * np.hypot(speed / np.sqrt(square), acceleration / square)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig(Shared):
     """Motor, drive and load together, as the kernel takes them. MotorError if they do not go together."""
@@ -30,6 +44,7 @@ class Rig(Shared):
     load: Load = NO_LOAD
     substep: Ns = SUBSTEP
     sequences: tuple[Winding, ...] = ()  # that can be commanded, all on one grid, which is that of the drive's
+    damping: Damping | None = None  # None: the motor's own, or what is usual with this drive; never None once made
     parameters: Floats = field(init=False)
     table_a: Floats = field(init=False)
     table_b: Floats = field(init=False)
@@ -42,16 +57,20 @@ class Rig(Shared):
         resistance = motor.resistance + drive.resistance
         inertia = motor.rotor + load.inertia
         winding = drive.winding
-        # a substep must be short beside the winding's time constant, and beside the rotor's swing
-        fastest = max((motor.teeth * motor.holding_torque / inertia) ** 0.5, 1e-9)
-        fastest = max(fastest, motor.torque_constant / (inertia * motor.real_inductance) ** 0.5)  # ... and its EMF
-        limit = min(0.5 * motor.real_inductance / resistance, 0.1 / fastest)
+        # the sheet's torque, not the current's: a motor that gets less swings more slowly
+        limit = float(limit_of(resistance, motor.real_inductance, inertia, motor.teeth, motor.torque_constant,
+                               motor.current))  # fmt: skip
         if limit < 1e-7:
             raise MotorError(
                 f"motor {motor.name}: L / R of {motor.real_inductance / resistance:.2g} s, or the inertia of "
                 f"{inertia:.2g} kg m2, is too small to be a motor's: check the units (H, kg m2)"
             )
         set_ = object.__setattr__
+        if self.damping is None:
+            own = motor.damping
+            set_(self, "damping", usual(drive.decay) if own is None else given(own, "from the motor's data"))
+        assert self.damping is not None
+        checked(self.damping)
         set_(self, "substep", min(self.substep, floor(limit * 1e9)))
         par = np.zeros(kernel.PARAMETERS)
         par[kernel.R], par[kernel.L] = resistance, motor.real_inductance
@@ -62,6 +81,10 @@ class Rig(Shared):
         par[kernel.GAIN] = resistance
         par[kernel.T_START], par[kernel.T_STEP] = load.torque_by_time[:2]
         par[kernel.P_START], par[kernel.P_STEP] = load.torque_by_position[:2]
+        torque = motor.torque_constant * sqrt(2) * drive.current
+        par[kernel.DAMPING] = 2 * self.damping.ratio * sqrt(motor.teeth * torque * motor.rotor)
+        par[kernel.ROLL_OFF] = self.damping.roll_off * 2 * pi / motor.steps
+        par[kernel.FALL], par[kernel.GLIDE] = drive.fall, float(drive.interpolation)
         if load.is_steady:
             par[kernel.TL] = load.at_rest()
         set_(self, "parameters", par)
@@ -94,6 +117,7 @@ class Rig(Shared):
         s[kernel.X] = angle - (asin(pull / most) * (1 if torque > 0 else -1) if pull else 0.0)
         n[kernel.NOW], n[kernel.PLACE], n[kernel.MODE] = now, place, self.drive.mode
         n[kernel.LOST_PULSE] = -1
+        n[kernel.PULSED], n[kernel.GAP], n[kernel.FROM] = now - kernel.LONG_AGO, kernel.LONG_AGO, place
         return s, n
 
 

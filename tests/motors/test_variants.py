@@ -1,0 +1,152 @@
+"""Variants: the same verdicts as one by one, draws that can be made again, and what a count of losses proves."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tests.motors.moves import LARGE, SMALL, even, ramped, rig
+
+from detent.motors import chance, engine
+from detent.motors.drive import Drive
+from detent.motors.load import Load, Profile
+from detent.motors.motor import MotorError
+from detent.motors.move import simulate
+from detent.motors.rotor import Rig
+from detent.motors.variants import SPREAD, Ensemble, LossRate, Spread, changed, corners, draws, loss_rate, percent
+from detent.motors.winding import HALF, microstep
+from detent.ramps.constant_acceleration import move
+
+compiled_only = pytest.mark.skipif(not engine.fast(), reason="numba is not installed")
+WIDE = SPREAD.changed({"inertia": (0.3, 6.0), "voltage": 0.5})
+
+
+@compiled_only
+@pytest.mark.parametrize("decay", ["fast", "slow", "mixed", "voltage"])
+@pytest.mark.parametrize("interpolation", [False, True])
+def test_an_ensemble_has_the_verdicts_of_its_rigs_one_by_one(decay: str, interpolation: bool) -> None:
+    """With the substep of the finest of them, to the last bit."""
+    winding = microstep(8) if interpolation else HALF
+    drive = Drive(24, 1.0, winding, decay, interpolation=interpolation, resistance=0.5, least_on=0.05)  # type: ignore[arg-type]
+    base = Rig(SMALL, drive, Load(3.5e-6, 0.01), substep=4_000)
+    some = Ensemble(base, draws(WIDE, 40))
+    times = ramped(400 * winding.steps // 2, 250 * winding.steps, 3500 * winding.steps)
+    found = some.judge(times)
+    alone = [simulate(times, some.rig_of(k)).verdict for k in range(len(some))]
+    assert [found.verdict(k).lost for k in range(len(some))] == [verdict.lost for verdict in alone]
+    assert 0 < found.lost.sum() < len(some)
+    kept = ~found.lost
+    angles = np.array([verdict.load_angle for verdict in alone])
+    assert found.load_angles[kept] == pytest.approx(angles[kept], abs=1e-6)
+
+
+def test_the_first_loss_ends_the_search_and_is_a_real_one() -> None:
+    some = Ensemble(rig(), draws(WIDE, 300))
+    times = ramped(400, 500, 7000)
+    lost = some.judge(times).lost
+    index = some.survives(times)
+    assert index is not None
+    assert lost[index]
+    assert some.of(~lost).survives(times) is None
+    assert some.of(np.array([index])).survives(times) == 0
+    assert len(some.of(slice(0, 5)).and_(some.factors[index])) == 6
+
+
+@pytest.mark.parametrize("which", ["time", "position"])
+def test_a_load_that_changes_on_the_way_has_variants_too(which: str) -> None:
+    wall = Profile(0.18, 0.01, (0.0, 0.12)) if which == "time" else Profile(1.5, 0.05, (0.0, 0.12))
+    load = Load(3.5e-6, 0.01, **{f"torque_by_{which}": wall})  # type: ignore[arg-type]
+    factors = np.ones((2, len(SPREAD)))
+    factors[1, -1] = 5.0  # five times the load
+    base = Rig(SMALL, Drive(24, 1.0, HALF), load)
+    some = Ensemble(base, factors)
+    assert some.judge(even(500, 200)).lost.tolist() == [False, True]
+    assert some.survives(even(500, 200)) == 1
+    assert simulate(even(500, 200), changed(base, load=5.0)).verdict.lost
+
+
+def test_a_weight_that_a_variant_cannot_hold_is_a_loss_and_no_error() -> None:
+    base = rig(torque=0.12)
+    factors = np.ones((2, len(SPREAD)))
+    factors[1, -1] = 3.0
+    assert Ensemble(base, factors).judge(even(100, 20)).lost.tolist() == [False, True]
+
+
+def test_corners_are_all_combinations_of_ends() -> None:
+    found = corners(SPREAD)
+    assert found.shape == (128, 8)
+    assert len(np.unique(found, axis=0)) == 128
+    assert set(np.unique(found[:, 0])) == {0.8, 1.2}
+    assert corners(SPREAD.of(rig(friction=0.0))).shape[0] == 64  # no friction to vary
+    assert SPREAD.changed({"load": (0.5, 1.5)}).of(rig(torque=0.01)).load == (0.5, 1.5)
+
+
+def test_draws_are_the_same_however_they_are_divided_and_fill_their_ranges() -> None:
+    whole = draws(SPREAD, 1000, seed=3)
+    pieces = np.concatenate([draws(SPREAD, 250, seed=3, first=first) for first in range(0, 1000, 250)])
+    assert np.array_equal(whole, pieces)
+    assert not np.array_equal(whole, draws(SPREAD, 1000, seed=4))
+    low, high = np.array(SPREAD).T
+    assert (whole >= low).all()
+    assert (whole <= high).all()
+    middle = (low + high) / 2
+    wide = high > low
+    assert whole.mean(axis=0)[wide] == pytest.approx(middle[wide], rel=0.03)
+    # no dimension follows another
+    shown = np.corrcoef(whole[:, wide].T) - np.eye(int(wide.sum()))
+    assert np.abs(shown).max() < 0.1
+
+
+def test_the_first_draws_are_those_of_splitmix() -> None:
+    """SplitMix64 as published: seed 1234567 gives 6457827717110365317, 3203168211198807973."""
+    with np.errstate(over="ignore"):
+        states = np.uint64(1234567) + np.uint64(0x9E3779B97F4A7C15) * np.arange(1, 3, dtype=np.uint64)
+    assert chance._mixed(states).tolist() == [6457827717110365317, 3203168211198807973]
+
+
+def test_none_of_2048_is_less_than_a_hundred_and_fiftieth_of_a_percent_of_ten() -> None:
+    """The rule of three: 3 / n; with k looks 0.05 / k each (0.15 %, 0.18 %, 0.20 %)."""
+    assert [percent(chance.bound(0, 2048, looks=k)) for k in (1, 2, 3)] == ["0.15 %", "0.18 %", "0.2 %"]
+    assert chance.bound(0, 1000) == pytest.approx(3 / 1000, rel=0.01)
+    assert chance.bound(7, 7) == 1.0
+
+
+@given(st.integers(1, 400), st.integers(0, 400))
+def test_the_bound_is_the_one_of_clopper_and_pearson(tried: int, lost: int) -> None:
+    """With that rate, as few losses or fewer have a chance of just 5 %."""
+    lost = min(lost, tried - 1)
+    rate = chance.bound(lost, tried)
+    binom = pytest.importorskip("scipy.stats").binom
+    assert binom.cdf(lost, tried, rate) == pytest.approx(0.05, rel=1e-6)
+    assert rate > lost / tried
+
+
+@compiled_only
+def test_a_margin_of_load_angle_is_not_one_of_losses() -> None:
+    """A move that the rig itself makes with room to spare, and that many of its variants lose."""
+    base = Rig(LARGE, Drive(24, 1.0, HALF, "slow"), Load(LARGE.rotor))
+    times = move(1000, 4500, 600, 6000).train
+    verdict = simulate(times, base).verdict
+    rate = loss_rate(times, base, tried=128)
+    assert not verdict.lost
+    assert verdict.margin > 0.6
+    assert rate.lost > 10
+    assert rate.corners_lost > 10
+    assert rate == loss_rate(times, base, tried=128)
+    assert f"lost by {rate.lost} of 128" in str(rate)
+
+
+def test_percent_rounds_a_bound_up() -> None:
+    assert [percent(value) for value in (0.001463, 0.0101, 0.2501, 1.0)] == ["0.15 %", "1.1 %", "26 %", "100 %"]
+    assert isinstance(LossRate(0, 10, 0, 128, 1).bound, float)
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [({"luck": 0.1}, "no variation of 'luck'"), ({"inertia": 1.0}, "variation of inertia"),
+     ({"voltage": (1.2, 0.8)}, "variation of voltage"), ({"friction": float("nan")}, "variation of friction")],
+)  # fmt: skip
+def test_ranges_that_are_none_are_refused(parts: dict[str, float], words: str) -> None:
+    with pytest.raises(MotorError, match=words):
+        Spread().changed(parts)
+    with pytest.raises(MotorError, match="factors"):
+        Ensemble(rig(), np.ones((3, 2)))
