@@ -144,6 +144,12 @@ class Axis:
             self._out.append(MotionCut(now, given, self.name))
         self._rest(given)
 
+    def displace(self, by: int) -> None:
+        """The shaft, at rest, is found `by` steps from where it was commanded to. RuntimeError while it moves."""
+        if self.train is not None:
+            raise RuntimeError("the axis is moving: `cut` it first")
+        self.shaft += by
+
     def gate(self, is_open: bool, now: Ns) -> None:
         """Shut or open the gate. A pulse that falls due while it is shut is held, and given when it opens.
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
+from detent.cell import real_pins
 from detent.cell.cell import Cell
 from detent.cell.deeds import Action, Power, SetSwitch, Type
 from detent.cell.delivery import Store, no_store
@@ -83,6 +84,9 @@ class _Builder:
         self.join_wires()
         actions = [action for n, entry in enumerate(self.description.script, 1) for action in self.actions(n, entry)]
         self.check_nets()
+        if self.description.hardware:
+            controllers = {name: self.controller(name) for name in self.axis_units()}
+            real_pins.check(self.description, controllers, self.joined)
         cell = Cell(self.wiring(lines), self.parts, [Net() for _ in self.nets],
                     [self.line(name, units, line_timing) for name, units in lines.items()],
                     [*actions, *journal], store=store, record=record)  # fmt: skip
@@ -363,6 +367,15 @@ class _Builder:
             if len(drivers) > 1 and any(end.pin.kind is not PinKind.OPEN_COLLECTOR for end in drivers):
                 pins = " and ".join(end.text for end in drivers)
                 raise self.problem("wires", f"{pins} drive the same wire: only open collectors may share one")
+
+    def joined(self, unit: str, pin: str) -> real_pins.Joined:
+        """What drives an input of a unit within the cell, and in its script."""
+        part = self.names.index(unit)
+        net = self.net_of.get((part, pin))
+        ends = [] if net is None else self.nets[net]
+        named = [self.names[end.part] for end in ends if end.pin.kind.drives]
+        scripted = ["the script" for entry in self.description.script if f"{unit}.{pin}" in entry.set]
+        return real_pins.Joined([*named, *scripted])
 
     def wiring(self, lines: Mapping[str, list[str]]) -> Wiring:
         units = len(self.description.units)

@@ -13,6 +13,8 @@ from detent.cell.deeds import (
     Action,
     Break,
     Deed,
+    Displace,
+    Halt,
     Load,
     Mend,
     PlaceSwitch,
@@ -267,6 +269,26 @@ class Cell(Delivery):
             self.controller(unit).start(self.now)
             self._touched.add(self.unit(unit))
         self._settle()
+
+    def halt(self, unit: str) -> None:
+        """Stop all axes of a unit at once, and its program, now. Raises KeyError, TypeError."""
+        if not self._acting:
+            self._catch_up()
+        self.controller(unit).halt(self.now)
+        self._keep(Halt(unit))
+        self._touched.add(self.unit(unit))
+        self._settle()
+        self._catch_up()
+
+    def displace(self, unit: str, axis: str, by: int) -> None:
+        """An axis at rest is found `by` steps from where it was commanded to, now. Raises RuntimeError if it moves."""
+        if not self._acting:
+            self._catch_up()
+        self.controller(unit).displace(by, self.now, axis)
+        self._keep(Displace(unit, axis, by))
+        self._touched.add(self.unit(unit))
+        self._settle()
+        self._catch_up()
 
     def breaks(self, fault: Fault, lasting: Ns | None = None) -> int:
         """Something breaks, now, for a time or until `mend`; the number of the fault.

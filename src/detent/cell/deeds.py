@@ -38,6 +38,12 @@ class Doer(Protocol):
     def place_switch(self, name: str, low: float | None, high: float | None) -> None:
         """Put a switch elsewhere on its axis, now."""
 
+    def halt(self, unit: str) -> None:
+        """Stop all axes of a unit at once, now."""
+
+    def displace(self, unit: str, axis: str, by: int) -> None:
+        """An axis at rest is found elsewhere, now."""
+
     def breaks(self, fault: Fault, lasting: Ns | None) -> int:
         """Something breaks, now; its number."""
 
@@ -146,6 +152,28 @@ class Start(NamedTuple):
         cell.start(self.unit)
 
 
+class Halt(NamedTuple):
+    """All axes of a unit stop at once, and its program: what moves them has failed."""
+
+    unit: str
+
+    def do(self, cell: Doer) -> None:
+        """Do it, now."""
+        cell.halt(self.unit)
+
+
+class Displace(NamedTuple):
+    """An axis at rest is found `by` steps from where it was commanded to."""
+
+    unit: str
+    axis: str
+    by: int
+
+    def do(self, cell: Doer) -> None:
+        """Do it, now."""
+        cell.displace(self.unit, self.axis, self.by)
+
+
 class Break(NamedTuple):
     """Something breaks, for a time or until it is mended. Faults are numbered from 1, in the order of their begin."""
 
@@ -167,7 +195,9 @@ class Mend(NamedTuple):
         cell.mend(self.fault)
 
 
-Deed: TypeAlias = Send | Type | SetSwitch | SetPin | Release | Power | Start | Load | PlaceSwitch | Break | Mend
+Deed: TypeAlias = (
+    Send | Type | SetSwitch | SetPin | Release | Power | Start | Load | PlaceSwitch | Halt | Displace | Break | Mend
+)
 
 
 class Action(NamedTuple):

@@ -12,23 +12,20 @@ from reprlib import Repr
 from typing import Annotated, Any, Literal
 
 from pydantic import (
-    AfterValidator,
     AliasChoices,
     BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     ValidationError,
     model_validator,
 )
 
-from detent.pins import HIGH, LOW, Level
-from detent.ticks import Ns, parse_duration
+from detent.cell.fields import STRICT, DurationField, LevelField, Name, Names, Number, Steps
+from detent.cell.hardware import Board, Hardware, by_axis
+from detent.pins import HIGH, LOW
 
 MOST_PROBLEMS = 5
 LEAST_LEAD = 1e-9
-MOST_STEPS = 10**15  # farther from 0 no axis stands, and no number of any other meaning is greater
-LONGEST_NAME = 64
 
 _KINDS = ("[key]", "constrained-int", "constrained-float", "int", "float", "str")  # no keys, but what was tried
 _BARE = re.compile(r"[A-Za-z0-9_.$ -]{1,64}")
@@ -45,45 +42,8 @@ class Problem(ValueError):
         self.file, self.key, self.message = file, key, message
 
 
-def _level(value: object) -> Level:
-    levels: dict[object, Level] = {"0": LOW, "low": LOW, "1": HIGH, "high": HIGH}
-    text = str(value).strip().lower()
-    if isinstance(value, bool) or text not in levels:
-        raise ValueError("a level is 0, 1, low or high")
-    return levels[text]
-
-
-def _duration(value: object) -> Ns:
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        raise ValueError("write a time like 1.5 (seconds) or '400 us'")
-    return parse_duration(value)
-
-
-def _list(value: object) -> object:
-    return [value] if isinstance(value, str) else value
-
-
-def _name(value: str) -> str:
-    if not value.strip() or value != value.strip() or not value.isprintable() or len(value) > LONGEST_NAME:
-        raise ValueError(f"a name is 1 to {LONGEST_NAME} characters, without blanks around them: choose another")
-    wrong = next((sign for sign in value if sign in ".:=/"), None)
-    if wrong is not None:
-        raise ValueError(
-            f"{wrong!r} in a name would part it where UNIT.PIN, UNIT:LINE or UNIT=FILE is written; leave it out"
-        )
-    return value
-
-
-Name = Annotated[str, AfterValidator(_name)]
-Steps = Annotated[int, Field(ge=-MOST_STEPS, le=MOST_STEPS)]
-Number = Annotated[float, Field(ge=-MOST_STEPS, le=MOST_STEPS)]
-LevelField = Annotated[Level, BeforeValidator(_level)]
-DurationField = Annotated[Ns, BeforeValidator(_duration)]
-Names = Annotated[list[str], BeforeValidator(_list)]
-
-
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = STRICT
 
 
 class Unit(_Table):
@@ -229,6 +189,8 @@ class Description(_Table):
     motors: dict[Name, Motor] = {}
     lines: dict[Name, Line] = {}
     script: list[ScriptEntry] = []
+    boards: dict[Name, Board] = {}
+    hardware: Annotated[dict[str, Hardware], BeforeValidator(by_axis)] = {}
     file: str = ""
 
     @model_validator(mode="after")
@@ -301,7 +263,8 @@ def _fault(item: Any) -> tuple[str, str]:
 def _known(location: tuple[int | str, ...]) -> list[str]:
     """The keys that the table of a wrong key takes."""
     tables: dict[str, type[BaseModel]] = {
-        "units": Unit, "wires": Wire, "switches": Switch, "motors": Motor, "lines": Line, "script": ScriptEntry
+        "units": Unit, "wires": Wire, "switches": Switch, "motors": Motor, "lines": Line, "script": ScriptEntry,
+        "boards": Board, "hardware": Hardware,
     }  # fmt: skip
     table = tables.get(str(location[0]), Description) if len(location) > 1 else Description
     names = []

@@ -265,3 +265,12 @@ class Controller(Device, Protocol):
 
     def start(self, now: Ns) -> None:
         """Start the program in memory, as if a host had asked for it."""
+
+    def halt(self, now: Ns) -> None:
+        """Stop all axes at once, without ramps, and the program with them, as its most abrupt command does."""
+
+    def displace(self, by: int, now: Ns, axis: str = "") -> None:
+        """An axis at rest is found `by` steps from where it was commanded to: all its counters say where it is.
+
+        RuntimeError while it moves.
+        """

@@ -343,6 +343,19 @@ class Dcb274:
         if self._powered and not self._running.active:
             self._running.go(self._base, False, now)
 
+    def halt(self, now: Ns) -> None:
+        """As | (page 25): motion and program are over."""
+        self.advance(now)
+        self._quiet = False
+        if self._powered:
+            self._interrupt(ord("|"), now)
+            self._poll(now)
+
+    def displace(self, by: int, now: Ns, axis: str = "") -> None:
+        """The shaft is elsewhere."""
+        self.advance(now)
+        self._axis.displace(by)
+
     # -- reset -------------------------------------------------------------------------------------------
 
     def _reset(self, now: Ns, *, party: bool) -> None:

@@ -229,6 +229,19 @@ class Board:
         axis = axis or AXES[0]
         return (f"L{axis}-", f"L{axis}+")
 
+    def halt(self, now: Ns) -> None:
+        """Both motors stop at once."""
+        self.advance(now)
+        for motor in self._motors.values():
+            motor.halt(now)
+        self._settle(now)
+
+    def displace(self, by: int, now: Ns, axis: str = "") -> None:
+        """The shaft of a motor is elsewhere."""
+        self.advance(now)
+        self._motors[axis or AXES[0]].displace(by)
+        self._settle(now)
+
     def duties(self, connector: str, now: Ns) -> Duties:
         """The PWM counts at the connector of an axis."""
         told = self._drive_of(connector, now)

@@ -170,6 +170,10 @@ class Motor:
             self._axis.cut(now)
         self._rest()
 
+    def displace(self, by: int) -> None:
+        """The shaft, at rest, is `by` microsteps from where it was thought to be."""
+        self._axis.displace(by)
+
     def look_at_limit(self, now: Ns) -> None:
         """A limit may have closed: one ahead is latched, and stops what goes on towards it, softly or at once."""
         if self.action is Action.IDLE or not self._limits.meets(self.name, self.direction):

@@ -242,6 +242,17 @@ class GsC200:
             self._programming = False
             self._running.run(self._ram, now)
 
+    def halt(self, now: Ns) -> None:
+        """As K."""
+        self.advance(now)
+        if self._running.busy:
+            self._running.kill(now)
+
+    def displace(self, by: int, now: Ns, axis: str = "") -> None:
+        """The shaft is elsewhere."""
+        self.advance(now)
+        self._axis.displace(by)
+
     # -- frames ------------------------------------------------------------------------------------------
 
     def _read(self, now: Ns) -> None:

@@ -228,6 +228,16 @@ class Supersigma:
         """There is no program to start."""
         self.advance(now)
 
+    def halt(self, now: Ns) -> None:
+        """The pulses stop without braking."""
+        self.advance(now)
+        self._motion.halt(now)
+
+    def displace(self, by: int, now: Ns, axis: str = "") -> None:
+        """The shaft is elsewhere."""
+        self.advance(now)
+        self._axis.displace(by)
+
     def _no_memory(self) -> NoReturn:
         raise ImageError("a supersigma drive holds no programs: its table is the option `table`")
 

@@ -125,6 +125,13 @@ class Motion:
         if self._axis.moving:
             self._axis.cut(now)
 
+    def halt(self, now: Ns) -> None:
+        """Stop at once, wherever it is."""
+        if self._axis.moving:
+            self._done = self._axis.given(now)
+            self._axis.cut(now)
+            self._rest(now)
+
     def advance(self, at: Ns) -> None:
         """Deal with the deadline `at`."""
         if self._step_rises <= at:

@@ -1,0 +1,176 @@
+"""``[boards.NAME]`` and ``[hardware.UNIT]``: which pin of which board is a pin of a unit.
+
+Pins of boards are written as users of 3D printers write them: ``!`` active low, ``^`` pull-up, ``~`` pull-down before
+the name. A cell runs everywhere with these tables; only a service that is told to drive real pins opens the boards.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, model_validator
+
+from detent.cell.fields import STRICT, DurationField, Names, Number
+from detent.ticks import MS, SECOND, US, Ns, parse_duration
+
+LEAST_LEAD: Ns = 3 * MS
+MOST_LEAD: Ns = SECOND // 2
+LEAST_WATCHDOG: Ns = 200 * MS
+_PIN = re.compile(r"(?P<signs>[!^~ ]*)(?P<name>[^!^~\s]+)")
+
+
+def _signed(value: str) -> str:
+    found = _PIN.fullmatch(value.strip())
+    signs = found["signs"].replace(" ", "") if found else ""
+    if found is None or signs.count("!") > 1 or signs.count("^") + signs.count("~") > 1:
+        raise ValueError("write a pin of a board like gpio7, !gpio7 (active low) or ^gpio7 (pull-up)")
+    return signs + found["name"]
+
+
+def _plain(value: str) -> str:
+    value = _signed(value)
+    if "^" in value or "~" in value:
+        raise ValueError("an output has no pull: leave out ^ and ~")
+    return value
+
+
+def _error(value: object) -> Ns | Literal["exact"]:
+    if value == "exact":
+        return "exact"
+    error = parse_duration(value) if isinstance(value, (str, int, float)) and not isinstance(value, bool) else -1
+    if not 1 <= error <= 100 * US:
+        raise ValueError("the error of a pulse is 'exact' (the nearest tick), or a time up to 100 us like '1 us'")
+    return error
+
+
+InPin = Annotated[str, AfterValidator(_signed)]
+OutPin = Annotated[str, AfterValidator(_plain)]
+ErrorField = Annotated[Ns | Literal["exact"], BeforeValidator(_error)]
+
+
+def bare(pin: str) -> str:
+    """The name of a pin of a board without its signs."""
+    return pin.lstrip("!^~")
+
+
+class _Table(BaseModel):
+    model_config = STRICT
+
+
+class Board(_Table):
+    """``[boards.NAME]``: a board with stock Klipper firmware, and how it is driven."""
+
+    serial: str  # the device; a name in /dev/serial/by-id stays the same whatever is plugged in when
+    lead: DurationField = 30 * MS  # what leaves the pins is so long behind the cell
+    error: ErrorField = 1 * US  # of a pulse, at most
+    watchdog: DurationField = 2 * SECOND  # enable pins let go when nobody has refreshed them for so long
+    replies: Literal["held", "at once"] = "held"  # until nothing can change them any more
+
+    @model_validator(mode="after")
+    def _sane(self) -> "Board":
+        if not self.serial.strip():
+            raise ValueError("serial is the device of the board: ls /dev/serial/by-id shows those that are plugged in")
+        if not LEAST_LEAD <= self.lead <= MOST_LEAD:
+            raise ValueError(f"lead is {LEAST_LEAD // MS} to {MOST_LEAD // MS} ms; 30 ms do on every computer")
+        least = max(LEAST_WATCHDOG, 4 * self.lead)
+        if self.watchdog < least:
+            raise ValueError(f"watchdog is at least {least // MS} ms here: a busy computer needs that")
+        return self
+
+
+class Driver(_Table):
+    """How a stepper driver gets its current: a chip whose registers are set, or a plain one with an input for half."""
+
+    kind: Literal["plain", "tmc2208", "tmc2209", "tmc2130", "tmc5160"]
+    half: OutPin | None = None  # plain: high while at most half of the current is wanted
+    amperes: Annotated[Number, Field(gt=0)] | None = None  # of a phase, for full power; a controller may command them
+    sense: Annotated[Number, Field(gt=0)] = 0.11  # ohm
+    uart: InPin | None = None
+    transmit: OutPin | None = None
+    address: Annotated[int, Field(ge=0, le=3)] = 0
+    select: OutPin | None = None
+    bus: str | None = None
+    clock: OutPin | None = None
+    mosi: OutPin | None = None
+    miso: InPin | None = None
+    quiet: bool = False
+    interpolate: bool = True
+
+    @model_validator(mode="after")
+    def _fits(self) -> "Driver":
+        if self.kind == "plain":
+            if self.half is None:
+                raise ValueError("a plain driver needs half = 'PIN', the input that halves its current; or no table")
+            return self
+        if self.half is not None:
+            raise ValueError(f"a {self.kind} gets its current by its registers: leave out half")
+        if self.kind in ("tmc2208", "tmc2209"):
+            if self.uart is None:
+                raise ValueError(f"a {self.kind} is told by its UART: uart = 'PIN'")
+        elif self.select is None:
+            raise ValueError(f"a {self.kind} is told by SPI: select = 'PIN', and bus or clock, mosi and miso")
+        elif (self.bus is None) == (self.clock is None or self.mosi is None or self.miso is None):
+            raise ValueError("give bus = 'NAME' of the board's own SPI, or the pins clock, mosi and miso")
+        return self
+
+    def pins(self) -> dict[str, str]:
+        """The pins of the board that it takes, by key."""
+        keys = ("half", "uart", "transmit", "select", "clock", "mosi", "miso")
+        return {key: pin for key in keys if (pin := getattr(self, key)) is not None}
+
+
+class Hardware(_Table):
+    """``[hardware.UNIT]``, ``[hardware.UNIT.AXIS]`` where it has several: the pins of a board behind an axis.
+
+    A table of a unit with several axes, without an axis, has what they share: `inputs` and `outputs`.
+    """
+
+    board: str
+    step: OutPin | None = None
+    dir: OutPin | None = None
+    minus: OutPin | None = None  # the clock of the minus direction, of two; dir then is a pin that nothing hangs on
+    enable: OutPin | None = None  # of the driver: on while the unit is
+    pulse: DurationField | None = None  # how long it lasts at least
+    outputs: dict[str, OutPin] = {}  # of the controller, by its name for them
+    inputs: dict[str, InPin] = {}
+    unwired: Names = []  # switches that this machine does not have
+    sample: DurationField = 50 * US  # between two looks at an input that stops the axis
+    samples: Annotated[int, Field(ge=1, le=255)] = 2  # alike, before it does
+    driver: Driver | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> "Hardware":
+        if self.step is None:
+            for key in ("dir", "minus", "enable", "pulse", "driver"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"{key} is of an axis that is driven: give step = 'PIN' too")
+        elif self.dir is None:
+            raise ValueError("dir is missing: the firmware needs a pin for it, a spare one where there are two clocks")
+        if not 10 * US <= self.sample <= 10 * MS:
+            raise ValueError("sample is 10 us to 10 ms")
+        return self
+
+    def pins(self) -> dict[str, str]:
+        """The pins of the board that it takes, by key."""
+        found = {key: pin for key in ("step", "dir", "minus", "enable") if (pin := getattr(self, key)) is not None}
+        found |= {f"outputs.{name}": pin for name, pin in self.outputs.items()}
+        found |= {f"inputs.{name}": pin for name, pin in self.inputs.items()}
+        if self.driver is not None:
+            found |= {f"driver.{key}": pin for key, pin in self.driver.pins().items()}
+        return found
+
+
+def by_axis(tables: object) -> object:
+    """The tables of axes within those of units, under names like ``slide.X``."""
+    if not isinstance(tables, Mapping):
+        return tables
+    found: dict[str, Any] = {}
+    for unit, table in tables.items():
+        if not isinstance(table, Mapping):
+            found[str(unit)] = table
+            continue
+        axes = {k: v for k, v in table.items() if isinstance(v, Mapping) and k not in Hardware.model_fields}
+        found |= {f"{unit}.{axis}": each for axis, each in axes.items()}
+        if len(axes) < len(table) or not table:
+            found[str(unit)] = {key: value for key, value in table.items() if key not in axes}
+    return found

@@ -1,0 +1,165 @@
+"""The hardware tables of a cell file: what they take, what they refuse, and that a cell is the same with them."""
+
+import pytest
+from tests.cell.cells import cell
+
+from detent.cell.description import Problem, parse
+
+GOOD = """
+[units.slide]
+model = "gs-c200"
+[units.table]
+model = "bs0610"
+[boards.left]
+serial = "/dev/serial/by-id/usb-Klipper_rp2040_E66160F423-if00"
+lead = "20 ms"
+error = "exact"
+[hardware.slide]
+board = "left"
+step = "!gpio2"
+dir = "gpio3"
+enable = "!gpio4"
+pulse = "5 us"
+outputs = { MOV = "gpio6", UO1 = "gpio7", RDY = "!gpio8" }
+inputs = { EOT = "^gpio10", HOME = "^gpio11", UI1 = "^!gpio12" }
+driver = { kind = "tmc2209", uart = "gpio16", address = 0, sense = 0.11, amperes = 1.2 }
+[hardware.table]
+board = "left"
+inputs = { RST = "^gpio30" }
+[hardware.table.X]
+board = "left"
+step = "gpio17"
+dir = "gpio18"
+inputs = { "LX-" = "^gpio19", "LX+" = "^gpio20" }
+driver = { kind = "tmc2209", uart = "gpio16", address = 1 }
+[hardware.table.Y]
+board = "left"
+step = "gpio21"
+dir = "gpio22"
+unwired = ["LY-", "LY+"]
+driver = { kind = "plain", half = "gpio23" }
+"""
+
+
+def test_a_cell_is_the_same_with_its_tables() -> None:
+    described = parse(GOOD, "cell.toml")
+    assert list(described.hardware) == ["slide", "table.X", "table.Y", "table"]
+    made, plain = cell(GOOD), cell(GOOD[: GOOD.index("[boards")])
+    for each in (made, plain):
+        each.type("slide", "+20")
+        each.run_to(3_000_000_000)
+    assert made.recording is not None
+    assert plain.recording is not None
+    assert list(made.recording) == list(plain.recording)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error"),
+    [
+        (
+            'dir = "gpio3"',
+            'dir = "gpio2"',
+            "hardware.slide.dir: pin gpio2 of left is hardware.slide.step already: take",
+        ),
+        ('"gpio18"', '"!gpio12"', "hardware.table.X.dir: pin gpio12 of left is hardware.slide.inputs.UI1 already"),
+        ('step = "!gpio2"', "", "hardware.slide: dir is of an axis that is driven: give step = 'PIN' too"),
+        ('dir = "gpio3"', "", "hardware.slide: dir is missing: the firmware needs a pin for it"),
+        ('dir = "gpio3"', 'dir = "^gpio3"', "hardware.slide.dir: an output has no pull: leave out ^ and ~"),
+        ('EOT = "^gpio10", ', "", "hardware.slide.inputs: slide has no EOT: wire it, inputs = { EOT = 'PIN' }, or say"),
+        ('unwired = ["LY-", "LY+"]', "", "hardware.table.Y.inputs: table.Y has no LY-: wire it"),
+        ('["LY-", "LY+"]', '["LY-", "LY+", "RST"]', "hardware.table.Y.unwired: no switch of table.Y 'RST'; there are"),
+        (
+            '["LY-", "LY+"]',
+            '["LY-", "LY+"]\ninputs = { "LY+" = "gpio40" }',
+            "table.Y.unwired: LY+ is wired in hardware.",
+        ),
+        ("UI1 =", "UI4 =", "hardware.slide.inputs.UI4: no input of slide 'UI4'; did you mean UI3?"),
+        ("MOV =", "CLOCK =", "hardware.slide.outputs.CLOCK: CLOCK carries the steps: name its pin with step"),
+        ("MOV =", "EOT =", "hardware.slide.outputs.EOT: no output of slide 'EOT'"),
+        ("[hardware.slide]", "[hardware.slid]", "hardware.slid: no controller 'slid'; did you mean slide?"),
+        ("[hardware.table.X]", "[hardware.table.Z]", "hardware.table.Z: no axis of table 'Z'"),
+        ("[hardware.table.X]", "[hardware.table.x]", "hardware.table.x: no axis of table 'x'; did you mean X?"),
+        (
+            '"left"\nstep = "!gpio2"',
+            '"right"\nstep = "!gpio2"',
+            "hardware.slide.board: no board 'right'; there are: left",
+        ),
+        (
+            'pulse = "5 us"',
+            'pulse = "1 us"',
+            "hardware.slide.pulse: the pulses of a gs-c200 are 1.7 us long: no shorter",
+        ),
+        ('pulse = "5 us"', 'puls = "5 us"', "hardware.slide.puls: there is no such key; did you mean pulse?"),
+        ('lead = "20 ms"', 'lead = "1 ms"', "boards.left: lead is 3 to 500 ms; 30 ms do on every computer"),
+        ('lead = "20 ms"', 'watchdog = "50 ms"', "boards.left: watchdog is at least 200 ms here"),
+        ('error = "exact"', 'error = "1 s"', "boards.left.error: the error of a pulse is 'exact'"),
+        (
+            'kind = "tmc2209", uart = "gpio16", address = 0',
+            'kind = "a4988"',
+            "slide.driver.kind: it should be 'plain', 'tmc",
+        ),
+        ('uart = "gpio16", address = 1', "address = 1", "hardware.table.X.driver: a tmc2209 is told by its UART"),
+        ('half = "gpio23"', "sense = 0.1", "hardware.table.Y.driver: a plain driver needs half = 'PIN'"),
+        (
+            'RST = "^gpio30"',
+            'RST = "^gpio30", "LX-" = "gpio31"',
+            "LX- is wired in hardware.table.X already: remove one",
+        ),
+        (
+            "[units.table]",
+            '[switches.end]\ndrives = "slide.EOT"\n[units.table]',
+            "slide.EOT is on a wire from end in this",
+        ),
+        (
+            "[units.table]",
+            '[[script]]\nat = 0\nset = { "slide.UI1" = 0 }\n[units.table]',
+            "slide.UI1 is on a wire from ",
+        ),
+        ("[boards.left]", '[boards.right]\nserial = "x"\n[boards.left]', ""),
+    ],
+)
+def test_what_cannot_be_is_one_line_with_file_key_and_remedy(old: str, new: str, error: str) -> None:
+    assert old in GOOD
+    text = GOOD.replace(old, new, 1)
+    if not error:
+        cell(text)
+        return
+    with pytest.raises(Problem) as raised:
+        cell(text)
+    assert error in str(raised.value)
+    assert str(raised.value).startswith("cell.toml: ")
+    assert "\n" not in str(raised.value)
+
+
+def test_a_switch_on_another_board_stops_too_late() -> None:
+    text = GOOD.replace('[hardware.table]\nboard = "left"\n', '[hardware.table]\nboard = "right"\n')
+    text = text.replace("[boards.left]", '[boards.right]\nserial = "x"\n[boards.left]')
+    moved = text.replace(', "LX+" = "^gpio20"', "").replace('RST = "^gpio30"', 'RST = "^gpio30", "LX+" = "gpio5"')
+    cell(text)
+    with pytest.raises(Problem, match=r"LX\+ stops table.X, which is on left, and from another board too late"):
+        cell(moved)
+
+
+def test_a_step_detector_does_not_gate_real_pins() -> None:
+    detector = """
+    [units.detector]
+    model = "step-detector"
+    [[wires]]
+    from = "slide.CLOCK"
+    to = "detector.CLOCK"
+    [[wires]]
+    from = "detector.DONE"
+    to = "slide.ENABLE"
+    [units.table]
+    """
+    with pytest.raises(
+        Problem, match=r"hardware\.slide: detector lets every single pulse of slide through: on real pins"
+    ):
+        cell(GOOD.replace("[units.table]", detector, 1))
+
+
+def test_a_switch_of_the_cell_is_a_switch_too() -> None:
+    text = GOOD.replace('EOT = "^gpio10", ', "").replace(
+        "[units.table]", '[switches.soft]\naxis = "slide"\nfrom = 500\ndrives = "slide.EOT"\n[units.table]'
+    )
+    cell(text)
