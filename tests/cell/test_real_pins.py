@@ -136,7 +136,7 @@ def test_a_switch_on_another_board_stops_too_late() -> None:
     text = text.replace("[boards.left]", '[boards.right]\nserial = "x"\n[boards.left]')
     moved = text.replace(', "LX+" = "^gpio20"', "").replace('RST = "^gpio30"', 'RST = "^gpio30", "LX+" = "gpio5"')
     cell(text)
-    with pytest.raises(Problem, match=r"LX\+ stops table.X, which is on left, and from another board too late"):
+    with pytest.raises(Problem, match=r"LX\+ stops table.X, which is on left: a stop on another board comes too late"):
         cell(moved)
 
 
