@@ -3,32 +3,17 @@
 import numpy as np
 import pytest
 
-from detent.controllers.catalogue import MODELS, CatalogueError
+from detent.controllers.catalogue import MODELS
 from detent.motors.motor import MotorError
 from detent.motors.named import motor
+from detent.moves import laws
 from detent.ramps import constant_acceleration, timer_table
 from detent.workbench import motion
 
 
-def test_every_model_of_the_catalogue_has_a_law() -> None:
-    for name, model in MODELS.items():
-        law = motion.law(name)
-        assert law.model == model.name
-        assert law.values == motion.clipped(law, {})
-        assert law.train(law.values, 100).steps == 100
-
-
-def test_the_settings_of_a_gsc200_are_those_of_its_table() -> None:
-    """S and T count tens of steps a second ("a by 10 multiplier is used"), R steps, 1 to 999."""
-    start_stop, slew, ramp = motion.law("gs-c200").settings
-    assert (start_stop.name, start_stop.low, start_stop.high, start_stop.scale) == ("S", 1, 1000, 10)
-    assert (slew.name, slew.unit) == ("T", "steps/s")
-    assert (ramp.name, ramp.low, ramp.high, ramp.scale) == ("R", 1, 999, 1)
-
-
 def test_a_move_of_a_gsc200_has_the_times_of_its_ramp() -> None:
     """Datasheet, example 2: S10 T100 R40; 500 steps with ramps of 40 from 100 to 1000 steps/s."""
-    law = motion.law("gs-c200")
+    law = laws.law("gs-c200")
     drawn = motion.picture(law.train({"S": 10, "T": 100, "R": 40}, 500))
     assert drawn.duration == constant_acceleration.move(100, 1000, 40, 500).train.duration
     assert drawn.peak == pytest.approx(1000)
@@ -41,7 +26,7 @@ def test_a_move_of_a_gsc200_has_the_times_of_its_ramp() -> None:
 
 def test_a_move_too_short_for_the_slew_speed_says_so() -> None:
     """Datasheet: "the ramping is reversed before the maximum speed"."""
-    law = motion.law("gs-c200")
+    law = laws.law("gs-c200")
     drawn = motion.picture(law.train({"S": 10, "T": 100, "R": 40}, 30))
     assert drawn.peak < 1000
     assert not drawn.reached
@@ -50,7 +35,7 @@ def test_a_move_too_short_for_the_slew_speed_says_so() -> None:
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("steps", [1, 2, 3, 50, 1234])
 def test_a_picture_begins_at_rest_ends_at_the_last_pulse_and_never_goes_back(model: str, steps: int) -> None:
-    law = motion.law(model)
+    law = laws.law(model)
     drawn = motion.picture(law.train(law.values, steps))
     assert drawn.times[0] == 0
     assert drawn.times[-1] == pytest.approx(drawn.duration * 1e-9)
@@ -63,13 +48,13 @@ def test_a_picture_begins_at_rest_ends_at_the_last_pulse_and_never_goes_back(mod
 
 def test_the_longest_moves_cost_no_more_than_short_ones() -> None:
     for name in MODELS:
-        law = motion.law(name)
+        law = laws.law(name)
         assert len(motion.picture(law.train(law.values, law.most)).times) < 2 * motion.COLUMNS
 
 
 def test_the_speeds_of_a_dcb274_are_those_that_its_timer_makes() -> None:
     """Page 65: speeds are counts of an 8 036 ns timer, which X prints as they really are (page 52)."""
-    law = motion.law("dcb-274")
+    law = laws.law("dcb-274")
     values = {**law.values, "V": 5000, "I": 400}
     drawn = motion.picture(law.train(values, 5000))
     assert drawn.peak == pytest.approx(1e9 / (timer_table.TICK * timer_table.count_of(5000)))
@@ -78,7 +63,7 @@ def test_the_speeds_of_a_dcb274_are_those_that_its_timer_makes() -> None:
 
 def test_the_divisor_of_a_dcb274_divides_all_speeds() -> None:
     """Page 37: "Divide speeds"."""
-    law = motion.law("dcb-274")
+    law = laws.law("dcb-274")
     once = motion.picture(law.train(law.values, 2000))
     twice = motion.picture(law.train({**law.values, "D": 2}, 2000))
     assert twice.duration == 2 * once.duration
@@ -87,21 +72,15 @@ def test_the_divisor_of_a_dcb274_divides_all_speeds() -> None:
 
 def test_genstepper_begins_with_its_options_and_ramps_by_p() -> None:
     """BS0610 manual, pages 29, 31 and 32: K, P and R in microsteps/s; on a ramp P is added every second."""
-    law = motion.law("bs0610", {"ramp": "4000", "run_rate": "1000"})
+    law = laws.law("bs0610", {"ramp": "4000", "run_rate": "1000"})
     assert law.values == {"K": 80, "R": 1000, "P": 4000}
     drawn = motion.picture(law.train(law.values, 3000))
     assert drawn.ramps[0] == pytest.approx((1000 - 80) / 4000, abs=1e-3)
 
 
-def test_genstepper_s_commands_choose_the_motor_first() -> None:
-    """Page 36: the commands that follow X are for motor X; page 33: S with a number goes so far."""
-    law = motion.law("bs0610", {}, "X")
-    assert law.commands(law.values, 300) == (("X", "80K", "800R", "8000P"), "300S")
-
-
 def test_a_supersigma_is_limited_by_its_command_or_else_by_its_table() -> None:
     """Cassinis, "Other features": move with ramps, at no more than the speed."""
-    law = motion.law("supersigma")
+    law = laws.law("supersigma")
     assert law.commands({"limit": 255}, 400) == ((), "move +400")
     assert law.commands({"limit": 60}, 400) == ((), "limit +400 60")
     drawn = motion.picture(law.train({"limit": 60}, 4000))
@@ -109,48 +88,21 @@ def test_a_supersigma_is_limited_by_its_command_or_else_by_its_table() -> None:
     assert motion.picture(law.train({"limit": 255}, 20000)).peak == pytest.approx(15037.6, abs=0.1)
 
 
-def test_the_settings_in_force_are_read_from_the_registers() -> None:
-    assert motion.in_force(motion.law("gs-c200"), {"S": "20", "T": "300", "R": "80"}) == {"S": 20, "T": 300, "R": 80}
-    dcb = motion.in_force(motion.law("dcb-274"), {"I": "500", "V": "2000", "K": "4/7", "D": "3"})
-    assert dcb == {"I": 500, "V": 2000, "K up": 4, "K down": 7, "D": 3}
-    assert motion.in_force(motion.law("bs0610", {}, "Y"), {"X K": "1", "Y K": "90", "Y R": "700"}, "Y")["K"] == 90
-
-
-def test_the_stepping_is_what_h_of_a_dcb274_says_and_else_the_usual_one() -> None:
-    """Page 40: H 1, the factory value, is a quarter step."""
-    assert motion.stepping(motion.law("dcb-274"), {"H": "1/4"}) == "1/4"
-    assert motion.stepping(motion.law("dcb-274"), {"H": "Full"}) == "full"
-    assert motion.stepping(motion.law("gs-c200"), {}) == "half"
-    assert motion.stepping(motion.law("bs0610", {"step_size": "3"}), {}) == ""  # 3/64 divide no full step
-
-
-def test_what_no_command_takes_is_brought_into_its_range() -> None:
-    law = motion.law("gs-c200")
-    assert motion.clipped(law, {"S": 0, "T": 5000}) == {"S": 1, "T": 1000, "R": 40}
-
-
-def test_an_unknown_model_or_option_is_refused_with_the_likeliest_other() -> None:
-    with pytest.raises(CatalogueError, match="did you mean gs-c200"):
-        motion.law("gs-c20")
-    with pytest.raises(CatalogueError, match="ramp"):
-        motion.law("bs0610", {"rampp": "1"})
-
-
 def rig(friction: float = 0.0) -> motion.Rig:
     found = motor("qsh4218-41-10-035")
-    half = motion.law("gs-c200").windings[0]
+    half = laws.law("gs-c200").windings[0]
     return motion.rig(found, half, supply=24, current=found.current, inertia=found.rotor, friction=friction)
 
 
 def test_a_gentle_move_is_followed_and_a_steep_one_is_lost() -> None:
-    law = motion.law("gs-c200")
+    law = laws.law("gs-c200")
     assert not motion.judged(law.train({"S": 10, "T": 150, "R": 60}, 300), rig()).lost
     assert motion.judged(law.train({"S": 10, "T": 900, "R": 3}, 300), rig(0.1)).lost
 
 
 def test_what_a_move_asks_is_inertia_times_acceleration_and_friction() -> None:
     """Constant acceleration from 100 to 1000 steps/s in 40 steps: (1000**2 - 100**2) / 80 steps/s2."""
-    law, motor_rig = motion.law("gs-c200"), rig(0.02)
+    law, motor_rig = laws.law("gs-c200"), rig(0.02)
     asked = motion.demand(motion.picture(law.train({"S": 10, "T": 100, "R": 40}, 500)), motor_rig)
     radians = 2 * np.pi / 400  # half steps of a motor with 200 steps
     inertia = motor_rig.motor.rotor + motor_rig.load.inertia
@@ -168,13 +120,13 @@ def test_the_torque_curve_reaches_beyond_the_move_and_falls() -> None:
 
 
 def test_a_move_that_would_take_minutes_to_judge_is_refused_with_a_remedy() -> None:
-    law = motion.law("gs-c200")
+    law = laws.law("gs-c200")
     with pytest.raises(MotorError, match="make it shorter"):
         motion.judged(law.train({"S": 1, "T": 2, "R": 1}, 100_000), rig())
 
 
 def test_a_motor_without_rotor_inertia_needs_one_for_the_whole() -> None:
     found = motor("qsh4218-41-10-035").changed(inertia=None)
-    half = motion.law("gs-c200").windings[0]
+    half = laws.law("gs-c200").windings[0]
     with pytest.raises(MotorError, match="rotor and load together"):
         motion.rig(found, half, supply=24, current=1.0, inertia=0.0, friction=0.0)

@@ -14,10 +14,12 @@ from detent.motors.load import Load
 from detent.motors.motor import Motor, MotorError
 from detent.motors.named import MOTORS
 from detent.motors.rotor import Rig
+from detent.moves import laws
+from detent.moves.law import Law, clipped, in_force, stepping
 from detent.realtime.target import target
 from detent.workbench import motion
 from detent.workbench.live import Live
-from detent.workbench.motion import Floats, Law, Picture
+from detent.workbench.motion import Floats, Picture
 
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
@@ -66,7 +68,7 @@ class Moves:
             raise ValueError(f"there is no axis {unit} {axis}".rstrip())
         defaults = {option.name: option.default for option in catalogue.model(picture.model).options}
         chosen = {option.name: option.value for option in picture.options if option.value != defaults[option.name]}
-        return motion.law(picture.model, chosen, axis)
+        return laws.law(picture.model, chosen, axis)
 
     async def about(self, unit: Name, axis: Name = "") -> dict[str, object]:
         """The settings of an axis with their ranges and what is in force, the motors, and the one that is fitted."""
@@ -75,9 +77,9 @@ class Moves:
             "unit": unit, "axis": axis, "model": law.model, "law": law.title, "units": law.unit,
             "most": law.most, "steps": min(FIRST_STEPS, law.most),
             "settings": [setting._asdict() for setting in law.settings],
-            "values": dict(motion.in_force(law, state.registers, axis)),
+            "values": dict(in_force(law, state.registers, axis)),
             "steppings": [winding.name for winding in law.windings],
-            "stepping": motion.stepping(law, state.registers),
+            "stepping": stepping(law, state.registers),
             "motors": [_facts(name, motor) for name, motor in self._motors().items()],
             "fitted": self._fitted(law, unit, axis),
         }  # fmt: skip
@@ -85,7 +87,7 @@ class Moves:
     async def move(self, wanted: Axis) -> dict[str, object]:
         """The picture of a move, and the command lines that make it."""
         law = self._law(wanted.unit, wanted.axis)
-        values, steps = motion.clipped(law, wanted.values), min(wanted.steps, law.most)
+        values, steps = clipped(law, wanted.values), min(wanted.steps, law.most)
         drawn = motion.picture(law.train(values, steps))
         commands = law.commands(values, steps)
         return {
@@ -161,7 +163,7 @@ def _rig(law: Law, form: Form, motors: Mapping[str, Motor]) -> Rig:
 def _judged(law: Law, wanted: Axis, form: Form, motors: Mapping[str, Motor]) -> dict[str, object]:
     """Everything that is shown of a motor. Raises MotorError."""
     rig = _rig(law, form, motors)
-    train = law.train(motion.clipped(law, wanted.values), min(wanted.steps, law.most))
+    train = law.train(clipped(law, wanted.values), min(wanted.steps, law.most))
     drawn: Picture = motion.picture(train)
     per_step = rig.drive.winding.steps
     curve = motion.torque_curve(rig, drawn.peak / per_step)
