@@ -1,0 +1,107 @@
+"""What the laws must know of a model: the adapter by which a controller joins them.
+
+An adapter is written from the manual. It says how a move is begun in each of the model's ways, what else may happen
+meanwhile, which stops there are and how long the manual lets each of them take, where limits are, and how a position is
+redefined. It says nothing about how the controller does any of that.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from random import Random
+from typing import Any, NamedTuple, Protocol
+
+from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Wait
+from tests.controllers.laws.histories import History, gap
+
+from detent.controllers.device import Controller
+from detent.ticks import Ns
+
+
+class Stop(NamedTuple):
+    """One way to stop, and the page of the manual that has it.
+
+    `deeds` are what is done. `applies` says whether it can be used now (only a key that is held can be let go),
+    `allowed` how long the manual lets it take from now on; both are asked before. `axes`: which ones it stops.
+    `holding`: keys stay held until then; for all others they are let go before.
+    """
+
+    name: str
+    page: str
+    deeds: Callable[[Bench], Sequence[Deed]]
+    allowed: Callable[[Bench], Ns]
+    applies: Callable[[Bench], bool] = lambda bench: True
+    axes: Callable[[Bench], Sequence[str]] = lambda bench: tuple(bench.travels)
+    holding: bool = False
+
+
+class Limit(NamedTuple):
+    """Something that stops `axis` in `direction` (0: in both) while it is closed.
+
+    `steps`: how many more the manual's own ramp-down has from a rate; asked whenever something happens, as what a host
+    changes meanwhile (a slope) counts. `barred`: no motion begins towards it while it is closed. `met`: whether what is
+    under way now heeds it (a home switch only where home is looked for). `gate`: what it stopped goes on when it opens.
+    """
+
+    name: str
+    axis: str
+    direction: int
+    closed: Callable[[Bench], bool]
+    steps: Callable[[Bench, float], int]
+    barred: bool = True
+    met: Callable[[Bench], bool] = lambda bench: True
+    gate: bool = False
+
+
+class Model(Protocol):
+    """The adapter of one model. See CONTRIBUTING, "The laws"."""
+
+    name: str
+    phases: Sequence[str]
+    """The phases of a motion, as `phase` names them."""
+
+    def options(self, draw: Random) -> Mapping[str, Any]:
+        """A way in which it is built."""
+
+    def make(self, options: Mapping[str, Any]) -> Controller:
+        """A new one."""
+
+    def ready(self) -> Sequence[Deed]:
+        """What it takes after its supply is switched on."""
+
+    def contacts(self, draw: Random) -> tuple[Contact, ...]:
+        """Switches on its axes, momentary ones too."""
+
+    def deeds(self, draw: Random) -> Sequence[Deed]:
+        """What may happen: moves in each of its ways, settings, questions, keys, momentary contacts, noise, power."""
+
+    def meanwhile(self, draw: Random) -> Sequence[Deed]:
+        """What may happen behind a stop without beginning a move, or changing a ramp."""
+
+    def phase(self, bench: Bench, axis: str) -> str:
+        """The phase in which an axis is."""
+
+    def let_go(self, bench: Bench) -> Sequence[Deed]:
+        """Let go whatever the manual lets set a motion off again by itself: keys that are held."""
+
+    def stops(self) -> Sequence[Stop]:
+        """Every stop that the manual names."""
+
+    def meets(self, phase: str, stop: Stop) -> bool:
+        """Whether a stop can come in a phase."""
+
+    def limits(self) -> Sequence[Limit]:
+        """Its limits."""
+
+
+def ready(model: Model, history: History) -> Bench:
+    """A bench with a device that has been switched on and is ready."""
+    bench = Bench(model.make(history.options), history.contacts)
+    bench.play((Power(True), *model.ready()))
+    return bench
+
+
+def history(model: Model, draw: Random, most: int = 12) -> History:
+    """A history of a model."""
+    deeds: list[Deed] = []
+    for _ in range(draw.randint(1, most)):
+        deeds += (*model.deeds(draw), Wait(gap(draw)))
+    return History(model.options(draw), model.contacts(draw), tuple(deeds))
