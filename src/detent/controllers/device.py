@@ -44,6 +44,14 @@ class Refused(NamedTuple):
     reason: str
 
 
+class Cautioned(NamedTuple):
+    """A frame or command was taken, and does what its sender may not expect: which, and what, in words."""
+
+    at: Ns
+    frame: str
+    what: str
+
+
 class StoreImage(NamedTuple):
     """Non-volatile memory is to be written. The owner answers with `stored` in the same instant."""
 
@@ -125,7 +133,7 @@ class DriveSet(NamedTuple):
 
 Output: TypeAlias = (
     Sent | PinSet | MotionStarted | MotionCut | MotionEnded | DriveSet | StageSet
-    | Executing | Finished | Refused | StoreImage | Powered
+    | Executing | Finished | Refused | Cautioned | StoreImage | Powered
 )  # fmt: skip
 
 

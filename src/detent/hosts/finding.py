@@ -17,8 +17,8 @@ where the earlier ones found nobody:
    answers, and nothing else happens (page 26). Letters are commands of GenStepper, and LF and a name would begin a
    daisy chain at a DCB-274 that waits for its sign-on (page 23): both would have answered SPACE. Before the first
    name, more than a line can hold spoils what may have stood there.
-4. **status** of each drive of a SUPERSIGMA, if it is asked for by name, and then nothing else: its messages have no
-   marks between them, so a drive that waits for the rest of one would take the question for it.
+4. **status** of each drive of a SUPERSIGMA, if it is asked for by name, behind a silence, and then nothing else: its
+   messages have no marks between them, so a drive that waits for the rest of one would take the question for it.
 
 Never asked: ``&`` of the SIN-10, which resets every axis; V1 before it is known who answers, which is a velocity
 to a DCB-274. A daisy chain without names is signed on as if it were one axis: switch it off and on to name it then.
@@ -32,6 +32,7 @@ from detent.hosts.dcb274.handshake import BS, LF, SINGLE_LONGEST, SPOIL, PartyLi
 from detent.hosts.errors import DriverError, Refused
 from detent.hosts.exchange import Answer, Ask, Clear, Pause, Progress, Rest, length, until
 from detent.hosts.gsc200.frames import Frames
+from detent.hosts.microbus import ANSWER, SILENCE, STATUS
 from detent.ticks import SECOND
 from detent.uart import Format
 
@@ -55,7 +56,6 @@ DRIVES = range(256)
 SPACES = 2  # the first character behind a while may be lost
 PATIENCE = 0.05  # seconds that a controller, an adapter and this computer may take to begin an answer
 STATE = r"[RB]|E[356]"  # what F is answered: ready, busy, an error that a program left behind
-STATUS = 5  # op-code of the SUPERSIGMA
 
 
 class Tune(NamedTuple):
@@ -308,10 +308,11 @@ def _ends_in(end: bytes) -> Callable[[bytes], int | None]:
 
 def _status(one: Pass, asked: _Asked) -> Search:
     found = []
+    yield Pause(SILENCE)  # a drive forgets half a message
     for number in DRIVES:
         yield asked.next(one, f"drive {number}")
         yield Clear()
-        answer = yield Ask(bytes((number, STATUS)), length(3), one.seconds)
+        answer = yield Ask(bytes((number, STATUS)), length(ANSWER), one.seconds)
         if answer.whole:
             steps, moving = int.from_bytes(answer.data[:2], "big"), answer.data[2] & 1
             says = f"{'moving' if moving else 'at rest'}, {steps} steps in its last movement"

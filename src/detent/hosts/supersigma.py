@@ -7,51 +7,29 @@ answered, so whether a command was taken is known when the drive is asked.
 
 from collections.abc import Callable, Iterable, Mapping
 from math import asin, sqrt
-from typing import Final, NamedTuple
 
 from detent.hosts.axis import POLL, Axis, Limits, Speeds
-from detent.hosts.errors import Busy, MotionFailed, NoAnswer, Spoken
-from detent.hosts.exchange import Ask, Asynchronous, Blocking, Clear, Driver, Rest, Steps, length, operation
-from detent.hosts.interpolation import LARGEST_SPEED, UNIT, legs, order_of
+from detent.hosts.errors import Busy, MotionFailed
+from detent.hosts.exchange import Ask, Asynchronous, Blocking, Rest, Steps, operation
+from detent.hosts.interpolation import UNIT, legs, order_of
+from detent.hosts.microbus import (
+    CONSTANT,
+    EMERGENCY,
+    LARGEST_STEPS,
+    LIMIT,
+    MOVE,
+    ORIGINATE,
+    PATIENCE,
+    STOP,
+    BusDriver,
+    Report,
+    drive_number,
+    message,
+    speed_units,
+)
 
-MOVE, CONSTANT, LIMIT, ORIGINATE, STATUS, STOP, EMERGENCY = range(1, 8)
-BACKWARD: Final = 0x80
-LARGEST_STEPS: Final = 0xFFFF
-PATIENCE: Final = 0.5  # seconds for the answer to status, beyond what its bytes take
 # The curve of the paper, V = 15000 sin^2(4.54426 t + 0.2097) half steps/s: where ramps begin, and where they end.
 LOW, TOP, _RATE, _PHASE = 650, 15_000, 4.54426, 0.2097
-
-
-class Report(NamedTuple):
-    """An answer to status: the steps of the last movement or of the one under way, and the flags."""
-
-    steps: int
-    flags: int
-
-    @property
-    def moving(self) -> bool:
-        """The motor moves."""
-        return bool(self.flags & 0x01)
-
-    @property
-    def end_of_rail(self) -> bool:
-        """The end of the rail was met."""
-        return bool(self.flags & 0x02)
-
-    @property
-    def excessive_force(self) -> bool:
-        """There was excessive force."""
-        return bool(self.flags & 0x04)
-
-    @property
-    def originated(self) -> bool:
-        """The origin has been found."""
-        return bool(self.flags & 0x08)
-
-    @property
-    def refused(self) -> bool:
-        """A command was refused."""
-        return bool(self.flags & 0x10)
 
 
 class DriveFailed(MotionFailed):
@@ -62,7 +40,7 @@ class DriveFailed(MotionFailed):
         self.drive, self.report = drive, report
 
 
-class Supersigma(Axis):
+class Supersigma(Axis, BusDriver):
     """One drive, `drive` its number on the bus; several may share a port.
 
     A drive does not count positions. The driver does, from the steps that status reports of each movement, and knows
@@ -72,7 +50,7 @@ class Supersigma(Axis):
 
     def __init__(self, drive: int = 1, *, patience: float = PATIENCE) -> None:
         """Raises ValueError."""
-        _drive(drive)
+        drive_number(drive)
         self.drive, self._patience = drive, patience
         self.title = f"drive {drive}"
         self._limit: int | None = None  # of moves with ramps, half steps/s
@@ -86,7 +64,7 @@ class Supersigma(Axis):
     @operation
     def status(self) -> Steps[Report]:
         """Steps of the last movement or of the one under way, and flags. Raises NoAnswer."""
-        report = yield from _ask(self.drive, self._patience)
+        report = yield from self._status(self.drive)
         if self._direction and not report.moving:
             if not report.refused:  # then the steps are those of the movement before
                 self._from = self._place(report)
@@ -95,11 +73,16 @@ class Supersigma(Axis):
 
     @operation
     def move(self, steps: int, *, limit: int | None = None) -> Steps[None]:
-        """Begin a movement with ramps, at no more than `limit` half steps/s if that is given. Raises Busy."""
-        if limit is None:
-            yield from self._begin(message(self.drive, MOVE, steps), steps)
-        else:
-            yield from self._begin(message(self.drive, LIMIT, steps, limit), steps)
+        """Begin a movement with ramps, at no more than `limit` half steps/s if that is given. Raises Busy.
+
+        Below 650, where the ramps begin, it goes at the limit from the first step to the last.
+        """
+        yield from self._begin(_move(self.drive, steps, limit), steps)
+
+    @operation
+    def limited(self, steps: int, limit: int) -> Steps[None]:
+        """Begin a movement with op-code 03h, whatever `limit`: below 650 the drive goes at 650. Raises Busy."""
+        yield from self._begin(message(self.drive, LIMIT, steps, limit), steps)
 
     @operation
     def constant(self, steps: int, speed: int) -> Steps[None]:
@@ -114,8 +97,8 @@ class Supersigma(Axis):
 
     @operation
     def emergency(self) -> Steps[None]:
-        """Stop by the steepest ramp."""
-        yield Ask(message(self.drive, EMERGENCY))
+        """Stop by the steepest ramp. Raises NoAnswer if the drive does not tell that it heard it."""
+        yield from self._stopped(self.drive, EMERGENCY)
 
     def _begin(self, data: bytes, steps: int) -> Steps[None]:
         """A drive refuses to begin while it moves, and tells only when it is asked: it is asked first."""
@@ -157,8 +140,8 @@ class Supersigma(Axis):
 
     @operation
     def stop(self) -> Steps[None]:
-        """Stop through the ramp."""
-        yield Ask(message(self.drive, STOP))
+        """Stop through the ramp. Raises NoAnswer if the drive does not tell that it heard it."""
+        yield from self._stopped(self.drive, STOP)
 
     @operation
     def halt(self) -> Steps[None]:
@@ -195,6 +178,8 @@ class Supersigma(Axis):
     def set_speeds(self, speeds: Speeds) -> Steps[Speeds]:
         """Keep moves below `slew`, rounded down to hundreds. Start and ramp are those of the drive's table.
 
+        A `slew` below 650, where its ramps begin, makes them constant at that.
+
         What is returned counts for the paper's table. Nothing is sent: the limit goes with each move.
         """
         if speeds.slew < UNIT:
@@ -202,7 +187,7 @@ class Supersigma(Axis):
         limit = int(speeds.slew // UNIT) * UNIT
         self._limit = limit if limit < TOP else None
         if limit <= LOW:
-            return Speeds(LOW, LOW, 0.0)
+            return Speeds(limit, limit, 0.0)
         slew = min(limit, TOP)
         return Speeds(LOW, slew, (asin(sqrt(slew / TOP)) - _PHASE) / _RATE)
         yield
@@ -224,7 +209,7 @@ class Supersigma(Axis):
             raise DriveFailed(self.drive, "found no origin", report)
 
 
-class Ccu(Driver):
+class Ccu(BusDriver):
     """The drives of one MICROBUS together: each call names the drive or the drives. It keeps no positions."""
 
     title = "CCU"
@@ -237,33 +222,38 @@ class Ccu(Driver):
 
     @operation
     def move(self, drive: int, steps: int, *, limit: int | None = None) -> Steps[None]:
-        """Begin a movement with ramps, at no more than `limit` half steps/s if that is given."""
-        yield Ask(_move(drive, steps, limit))
+        """Begin a movement with ramps, at no more than `limit` half steps/s if that is given. Raises Busy."""
+        yield from self._begin(drive, _move(drive, steps, limit))
 
     @operation
     def move_constant(self, drive: int, steps: int, speed: int) -> Steps[None]:
-        """Begin a movement at `speed` half steps/s without ramps."""
-        yield Ask(message(drive, CONSTANT, steps, speed))
+        """Begin a movement at `speed` half steps/s without ramps. Raises Busy."""
+        yield from self._begin(drive, message(drive, CONSTANT, steps, speed))
 
     @operation
     def originate(self, drive: int) -> Steps[None]:
-        """Begin the search for the origin."""
-        yield Ask(message(drive, ORIGINATE))
+        """Begin the search for the origin. Raises Busy."""
+        yield from self._begin(drive, message(drive, ORIGINATE))
 
     @operation
     def stop(self, drive: int) -> Steps[None]:
-        """Stop through the ramp."""
-        yield Ask(message(drive, STOP))
+        """Stop through the ramp. Raises NoAnswer if the drive does not tell that it heard it."""
+        yield from self._stopped(drive, STOP)
 
     @operation
     def emergency(self, drive: int) -> Steps[None]:
-        """Stop by the steepest ramp."""
-        yield Ask(message(drive, EMERGENCY))
+        """Stop by the steepest ramp. Raises NoAnswer if the drive does not tell that it heard it."""
+        yield from self._stopped(drive, EMERGENCY)
 
     @operation
     def status(self, drive: int) -> Steps[Report]:
         """Ask a drive. Raises NoAnswer."""
-        return (yield from _ask(drive, self._patience))
+        return (yield from self._status(drive))
+
+    def _begin(self, drive: int, data: bytes) -> Steps[None]:
+        """Whoever is to move is asked first: it is at rest and in step with us then."""
+        yield from self._ready(drive)
+        yield Ask(data)
 
     # -- several drives ----------------------------------------------------------------------------------
 
@@ -306,7 +296,7 @@ class Ccu(Driver):
         The longest axis goes at `speed` half steps/s at most: constant speeds have no ramps, so the motors must be
         able to start at it. No axis is ever a whole step of its own away from the line.
         """
-        fastest = _units(speed)
+        fastest = speed_units(speed)
         drives = [drive for drive, count in steps.items() if count]
         distances = [steps[drive] for drive in drives]
         for drive, count in zip(drives, distances, strict=True):
@@ -323,52 +313,19 @@ class Ccu(Driver):
 
     def _all(self, steps: Mapping[int, int], start: Callable[[int], bytes]) -> Steps[dict[int, Report]]:
         drives = [drive for drive, count in steps.items() if count]
-        for data in [start(drive) for drive in drives]:
-            yield Ask(data)
+        data = [start(drive) for drive in drives]
+        for drive in drives:
+            yield from self._ready(drive)
+        for one in data:
+            yield Ask(one)
         return (yield from self.wait_for(*drives))
 
 
-def message(drive: int, code: int, steps: int | None = None, speed: int | None = None) -> bytes:
-    """One message (table 1): number, op-code with the direction, steps, speed. Raises ValueError."""
-    data = bytearray([_drive(drive), code])
-    if steps is not None:
-        if not 1 <= abs(steps) <= LARGEST_STEPS:
-            raise ValueError(f"a movement has 1 to {LARGEST_STEPS} steps, forward (+) or backward (-), not {steps}")
-        data[1] |= BACKWARD if steps < 0 else 0
-        data += abs(steps).to_bytes(2, "big")
-    if speed is not None:
-        data.append(_units(speed))
-    return bytes(data)
-
-
 def _move(drive: int, steps: int, limit: int | None) -> bytes:
-    return message(drive, MOVE, steps) if limit is None else message(drive, LIMIT, steps, limit)
-
-
-def _drive(drive: int) -> int:
-    """`drive`, if it can be the number of one. Raises ValueError."""
-    if not 0 <= drive <= 0xFF:
-        raise ValueError(f"a drive has a number of 0 to 255, not {drive}")
-    return drive
-
-
-def _units(speed: int) -> int:
-    """The byte of a speed. Raises ValueError for one that it cannot hold."""
-    units, rest = divmod(speed, UNIT)
-    if rest or not 1 <= units <= LARGEST_SPEED:
-        raise ValueError(f"a speed is a multiple of {UNIT} half steps/s up to {LARGEST_SPEED * UNIT}, not {speed}")
-    return units
-
-
-def _ask(drive: int, patience: float) -> Steps[Report]:
-    """Status of a drive. A late answer to an earlier question is not taken for it."""
-    yield Clear()
-    data = message(drive, STATUS)
-    answer = yield Ask(data, length(3), patience)
-    if not answer.whole:
-        what = "does not finish its answer" if answer.data else "does not answer status"
-        raise NoAnswer(f"drive {drive}", f"{what} within {patience:g} s", Spoken(data, answer.data))
-    return Report(int.from_bytes(answer.data[:2], "big"), answer.data[2])
+    """The message of a movement at no more than `limit`: below where ramps begin that is constant speed."""
+    if limit is None:
+        return message(drive, MOVE, steps)
+    return message(drive, CONSTANT if limit < LOW else LIMIT, steps, limit)
 
 
 def _check(drive: int, report: Report) -> None:

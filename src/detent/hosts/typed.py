@@ -16,7 +16,8 @@ from detent.hosts.gsc200 import GsC200
 from detent.hosts.gsc200.commands import EEPROM_SECONDS
 from detent.hosts.gsc200.dialogue import ERRORS, Again
 from detent.hosts.interpolation import UNIT
-from detent.hosts.supersigma import Report, Supersigma
+from detent.hosts.microbus import Report
+from detent.hosts.supersigma import LOW, Supersigma
 
 FOR_EVER: Final = 86_400.0  # seconds: as long as the motion takes that is waited for
 ANYTHING: Final = re.compile(r"(?s).+")
@@ -148,7 +149,12 @@ def _(driver: Supersigma, line: str) -> Steps[Said]:
         case ["move"], [steps]:
             yield from driver.move(steps)
         case ["limit"], [steps, speed]:
-            yield from driver.move(steps, limit=speed * UNIT)
+            yield from driver.limited(steps, speed * UNIT)
+            if speed * UNIT < LOW:
+                meaning = (
+                    f"sent; {speed * UNIT} half steps/s is below {LOW}, where the ramps of the paper's table begin"
+                )
+                return Said((), f"{meaning}: it goes at {LOW}; status tells what comes of it")
         case ["constant"], [steps, speed]:
             yield from driver.constant(steps, speed * UNIT)
         case ["originate"], []:

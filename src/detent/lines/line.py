@@ -58,6 +58,7 @@ class Line:
 
     hosted: bool = False  # whether its host is a unit of the cell
     strobe: str = ""  # the input of every unit that the line drives, if it has such a wire
+    parting: Chars = b""  # what its units hear when the host's program leaves, where that means something to them
 
     def __init__(self, form: Format, *, timed: bool = True, early: Ns = 0, start_bits: bool = False) -> None:
         self.format = form

@@ -3,7 +3,9 @@
 Every drive sees every byte of the CCU, and the CCU every answer. As a stream of bytes it is like any line with
 several units; beside the bytes the line drives the strobe /DATA READY, the T0 of every drive. A byte stands on the
 bus for its whole time, and the strobe is low in the second half of it: the drives have taken the byte when it
-goes high. How long a byte takes is our assumption, and the format's matter.
+goes high. How long a byte takes is our assumption, and the format's matter. So is that the drives see it when the
+program of the CCU lets go of the bus (`LET_GO`): messages have no marks, and half a message must not wait for the next
+program's bytes.
 """
 
 from collections import deque
@@ -11,7 +13,9 @@ from collections import deque
 from detent.lines.line import Arrival, Line
 from detent.pins import HIGH, LOW, Level
 from detent.ticks import Ns
-from detent.uart import Format
+from detent.uart import Char, Chars, Format
+
+LET_GO = Char(0, framing_ok=False)  # the CCU lets go of the bus: no byte, and no strobe
 
 
 class Microbus(Line):
@@ -20,6 +24,7 @@ class Microbus(Line):
     __slots__ = ("_edges", "_strobed")
 
     strobe: str = "T0"
+    parting: Chars = (LET_GO,)
 
     def __init__(self, form: Format, *, timed: bool = True, early: Ns = 0, start_bits: bool = False) -> None:
         self._edges: deque[tuple[Ns, Level]] = deque()  # of the strobe, to come
@@ -42,7 +47,7 @@ class Microbus(Line):
 
     def _plan(self) -> None:
         for sent in self._on_wire:
-            if sent.at > self._strobed and sent.done > sent.at:
+            if sent.at > self._strobed and sent.done > sent.at and sent.char.framing_ok:
                 self._strobed = sent.at
                 self._edges += ((sent.at + (sent.done - sent.at) // 2, LOW), (sent.done, HIGH))
         super()._plan()

@@ -163,7 +163,7 @@ def open_endpoints(
     opened: list[tuple[int, Endpoint]] = []
     for place, number in enumerate(outside):
         for one in _for_line(description, wanted, place, names[number], len(outside)):
-            endpoint = one.open(names[number], cell.lines[number].format)
+            endpoint = one.open(names[number], cell.lines[number].format, cell.lines[number].parting)
             opening.callback(endpoint.close)
             opened.append((number, endpoint))
     return opened

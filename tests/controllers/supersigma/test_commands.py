@@ -72,7 +72,7 @@ def test_what_cannot_be_a_command_is_refused_with_what_can(text: str, message: s
 def test_a_drive_finds_its_messages_among_those_to_others(sent: list[tuple[int, Command]]) -> None:
     receiver = Link(2)
     stream = b"".join(commands.message(number, command) for number, command in sent)
-    found = [message for value in stream if (message := receiver.feed(Char(value))) is not None]
+    found = [message for value in stream if (message := receiver.feed(Char(value), 0)) is not None]
     assert [commands.parse(message) for message in found] == [command for number, command in sent if number == 2]
 
 

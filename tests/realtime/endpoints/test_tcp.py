@@ -11,13 +11,14 @@ from detent.realtime.endpoints.endpoint import MOST_READ, MOST_WAITING, Endpoint
 from detent.realtime.endpoints.tcp import LINGER, TcpAddress, TcpPort
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace
+from detent.uart import Char, Chars
 
 
 class Bench:
     """A port, a cell that echoes, and a loop driven by hand."""
 
-    def __init__(self, host: str = "127.0.0.1") -> None:
-        self.port = TcpPort(TcpAddress(host, 0), "drill")
+    def __init__(self, host: str = "127.0.0.1", parting: Chars = b"") -> None:
+        self.port = TcpPort(TcpAddress(host, 0), "drill", parting)
         self.cell = TickingCell(None, lines=2)
         self.beside = Client()  # on the other line
         self.loop = Loop(self.cell, Pace(), [(0, self.port), (1, self.beside)], wait=look)
@@ -268,3 +269,22 @@ def test_closing_twice_does_no_harm() -> None:
     port = TcpPort(TcpAddress("127.0.0.1", 0), "drill")
     port.close()
     port.close()
+
+
+def test_a_line_to_which_it_means_something_hears_once_that_a_client_has_left() -> None:
+    gone = (Char(0, framing_ok=False),)
+    bench = Bench(parting=gone)
+    try:
+        silent = bench.connect()
+        reset(silent)
+        bench.step_until(lambda: not bench.connected)
+        bench.exchange(bench.connect(), b"\x01\x01")
+        bench.clients[-1].shutdown(socket.SHUT_WR)
+        bench.step_until(lambda: bench.port.deadline() is not None)
+        bench.exchange(bench.connect(), b"\x02")
+        reset(bench.clients[-1])
+        bench.step_until(lambda: not bench.connected)
+        bench.exchange(bench.connect(), b"\x03")
+        assert [data for _, _, data in bench.cell.sent] == [b"\x01\x01", gone, b"\x02", gone, b"\x03"]
+    finally:
+        bench.close()

@@ -62,7 +62,10 @@ class Row(NamedTuple):
 TABLE: Final[tuple[Row, ...]] = (
     Row(Op.MOVE, "move", True, False, True, "Move, with the ramps that the length allows.", "Long movements"),
     Row(Op.CONSTANT, "constant", True, True, True, "Move at constant speed, without ramps.", "Other features"),
-    Row(Op.LIMIT, "limit", True, True, True, "Move with ramps, at no more than the speed.", "Other features"),
+    Row(
+        Op.LIMIT, "limit", True, True, True,
+        "Move with ramps, at no more than the speed; one below where ramps begin counts as that.", "Other features",
+    ),
     Row(
         Op.ORIGINATE, "originate", False, False, True,
         "Go backward until the limit switch is active, then forward until it is released.", "Origination",

@@ -10,7 +10,7 @@ from typing import ClassVar, NoReturn
 
 from detent.assembler import ImageError
 from detent.axis import Axis
-from detent.controllers.device import Output, Powered, Refused, Status, Stop
+from detent.controllers.device import Cautioned, Output, Powered, Refused, Status, Stop
 from detent.controllers.supersigma import commands, link, pins
 from detent.controllers.supersigma.commands import Command, Op
 from detent.controllers.supersigma.link import Link
@@ -18,8 +18,9 @@ from detent.controllers.supersigma.motion import Motion
 from detent.controllers.supersigma.program import BRAKING, OFFSET, Program
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind, PulseOutput
 from detent.ramps.differences import PAPER, Differences
+from detent.ramps.rate_generator import CLOCK_HZ
 from detent.ramps.short_movements import Way
-from detent.ticks import NEVER, Ns
+from detent.ticks import NEVER, Ns, show_duration
 from detent.uart import Char, Format, Sent, SerialPort, Transmitter
 
 
@@ -84,7 +85,10 @@ class Supersigma:
         if not self._powered:
             return
         for char in chars:
-            message = self._link.feed(char)
+            if not char.framing_ok:
+                self._drop("the CCU let go of the bus", now)
+                continue
+            message = self._link.feed(char, now)
             if message is not None:
                 self._handle(message, now)
 
@@ -120,7 +124,7 @@ class Supersigma:
         """The EPROM is not written in the circuit."""
 
     def next_deadline(self) -> Ns | None:
-        """The earliest of: motion, next byte of an answer, its strobe."""
+        """The earliest of: motion, next byte of an answer, its strobe, the end of waiting for the rest of a message."""
         deadline = self._next()
         return None if deadline >= NEVER else deadline
 
@@ -129,6 +133,8 @@ class Supersigma:
         while (at := self._next()) <= now:
             if self._motion.deadline <= at:
                 self._motion.advance(at)
+            elif self._link.deadline <= at:
+                self._drop(f"no byte came for {show_duration(link.SILENCE)}", at)
             elif self._strobes and self._strobes[0][0] <= at:
                 self._driver.set(pins.ANSWER, self._strobes.popleft()[1], at)
             else:
@@ -262,7 +268,19 @@ class Supersigma:
             kept = 0 if command.op is Op.ORIGINATE else self._flags & link.ORIGINATED.bit
             self._flags = kept
             self._driver.set(pins.ATTENTION, LOW, now)
+            if caution := self._caution(command):
+                self._out.append(Cautioned(now, commands.spell(command), caution))
             self._move(command, now)
+
+    def _caution(self, command: Command) -> str:
+        """What is unexpected of a command that is taken: a limit that the ramps of the table cannot keep."""
+        limit, lowest = command.speed * commands.SPEED_UNIT, CLOCK_HZ // (self._motion.lowest + 1)
+        if command.op is not Op.LIMIT or limit >= lowest:
+            return ""
+        return (
+            f"{limit} half steps/s is below {lowest}, where the table begins: it goes at {lowest}, without ramps; "
+            f"constant {command.direction * command.steps:+d} {command.speed} would go at {limit}"
+        )
 
     def _move(self, command: Command, now: Ns) -> None:
         op, direction, steps, speed = command
@@ -275,6 +293,12 @@ class Supersigma:
                 self._motion.move_limited(steps, direction, speed * commands.SPEED_UNIT, now)
             case _:
                 self._motion.originate(now)
+
+    def _drop(self, why: str, now: Ns) -> None:
+        """Half a message is forgotten. It is no refusal: whoever asks next is another, or has begun anew."""
+        half = self._link.drop()
+        if half:
+            self._out.append(Refused(now, half.hex(" "), f"{why}: half a message is dropped"))
 
     def _refuse(self, message: bytes, reason: str, now: Ns) -> None:
         self._out.append(Refused(now, message.hex(" "), reason))
@@ -305,6 +329,8 @@ class Supersigma:
             at = byte
         if self._strobes and self._strobes[0][0] < at:
             at = self._strobes[0][0]
+        if self._link.deadline < at:
+            at = self._link.deadline
         return at
 
     _ALWAYS: ClassVar[dict[Op, Callable[["Supersigma", Ns], None]]] = {

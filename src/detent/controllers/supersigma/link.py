@@ -1,14 +1,20 @@
 """Messages on the MICROBUS (the paper's table 1): number of the drive, op-code, and what the op-code wants.
 
-Every drive sees every byte, so each must know how long the messages to the others are.
+Every drive sees every byte, so each must know how long the messages to the others are. There are no marks between
+messages: one byte too many, or a message that is never finished, would shift all that follow, and a question for status
+would become a move. So what has come of a message is dropped when no byte has come for `SILENCE`, or when the CCU lets
+go of the bus (our assumption; the paper's protocol "is given [1,3]").
 """
 
 from typing import NamedTuple
 
 from detent.controllers.supersigma import commands
+from detent.ticks import MS, NEVER, Ns
 from detent.uart import Char
 
 ANSWER_LENGTH = 3
+SILENCE: Ns = 100 * MS
+"""Longer than any pause that adapters and networks make within a message: 16 ms of a USB adapter, 40 ms of TCP."""
 
 
 class Flag(NamedTuple):
@@ -29,23 +35,35 @@ ATTENTION = END_OF_RAIL.bit | EXCESSIVE_FORCE.bit | REFUSED.bit
 
 
 class Link:
-    """Collects bytes into the messages for one drive, and makes its answers."""
+    """Collects bytes into the messages for one drive, and makes its answers. `deadline`: when to call `drop`."""
 
-    __slots__ = ("_bytes", "number")
+    __slots__ = ("_bytes", "deadline", "number")
 
     def __init__(self, number: int) -> None:
         self.number = number
         self._bytes = bytearray()
+        self.deadline: Ns = NEVER
 
-    def feed(self, char: Char) -> bytes | None:
+    def feed(self, char: Char, now: Ns) -> bytes | None:
         """Take one byte of the CCU; return the message it completes, if that is for this drive."""
         collected = self._bytes
         collected.append(char.value & 0xFF)
         if len(collected) < commands.SHORTEST or len(collected) < commands.length(collected[1]):
+            self.deadline = now + SILENCE
             return None
-        message = bytes(collected)
-        collected.clear()
+        message = self._take()
         return message if message[0] == self.number else None
+
+    def drop(self) -> bytes:
+        """Forget what has come of a message; return that, if it is for this drive."""
+        message = self._take()
+        return message if message[:1] == bytes([self.number]) else b""
+
+    def _take(self) -> bytes:
+        message = bytes(self._bytes)
+        self._bytes.clear()
+        self.deadline = NEVER
+        return message
 
     def frame(self, text: str) -> bytes:
         """The message to this drive that `text` says: a command in words, or its bytes in hex. ValueError."""

@@ -65,6 +65,11 @@ class Motion:
         """Whether origination is under way."""
         return self.course in (Course.TO_SWITCH, Course.FROM_SWITCH)
 
+    @property
+    def lowest(self) -> int:
+        """The N at which ramps begin."""
+        return self._program.table.first
+
     def steps_done(self, now: Ns) -> int:
         """What the step counter shows: the steps of the movement under way, or of the last one."""
         return self._axis.given(now) if self._axis.moving else self._done

@@ -20,9 +20,9 @@ class Rfc2217Port(TcpPort):
 
     kind = "rfc2217"
 
-    def __init__(self, address: TcpAddress, name: str, form: Format) -> None:
+    def __init__(self, address: TcpAddress, name: str, form: Format, parting: Chars = b"") -> None:
         """Raises EndpointError if the port cannot be had."""
-        super().__init__(address, name)
+        super().__init__(address, name, parting)
         self._form = form
         self._lost_before = 0  # by earlier clients
         self._port = ComPort(form, name)

@@ -44,8 +44,8 @@ class TcpPort:
 
     kind = "tcp"
 
-    def __init__(self, address: TcpAddress, name: str) -> None:
-        """Raises EndpointError if the port cannot be had."""
+    def __init__(self, address: TcpAddress, name: str, parting: Chars = b"") -> None:
+        """`parting` is what the line hears when a client leaves. Raises EndpointError if the port cannot be had."""
         self._listener = _listen(address)
         self._name = name
         host, port = self._listener.getsockname()[:2]
@@ -53,6 +53,9 @@ class TcpPort:
         self._client: socket.socket | None = None
         self._peer = ""
         self._until: WallNs | None = None  # the client has said everything, and goes then
+        self._parting = parting
+        self._said = False  # the client has said something
+        self._owed = False  # it has left since, or has said everything, and the line has not heard so
         self._outgoing = Outgoing(self._write)
 
     @property
@@ -82,23 +85,35 @@ class TcpPort:
         self._leave()
 
     def receive(self, descriptor: int, wall: WallNs) -> Chars:
-        """A new client, or what the client sent."""
+        """A new client, or what the client sent; and that a client has left, where that means something."""
         if descriptor == self._listener.fileno():
             self._accept()
-            return b""
+            return self._parted()
         if self._client is None or descriptor != self._client.fileno():
-            return b""  # it left in this very wake-up
+            return self._parted()  # it left in this very wake-up
         try:
             data = self._client.recv(MOST_READ)
         except BlockingIOError:
             return b""
         except OSError:
             self._leave()
-            return b""
+            return self._parted()
         if not data:
             self._until = wall + LINGER
-            return b""
+            self._ended()
+            return self._parted()
+        self._said = True
         return self._understood(data, wall)
+
+    def _ended(self) -> None:
+        """Nothing more will come from the client."""
+        self._owed |= self._said
+        self._said = False
+
+    def _parted(self) -> Chars:
+        """What the line hears of a client from which nothing more will come, once."""
+        owed, self._owed = self._owed, False
+        return self._parting if owed else b""
 
     def send(self, data: bytes, wall: WallNs) -> None:
         """Give `data` to the client, if there is one."""
@@ -158,6 +173,7 @@ class TcpPort:
 
     def _leave(self) -> None:
         """The client goes, or is gone."""
+        self._ended()
         self._outgoing.forget()
         self._until = None
         if self._client is not None:

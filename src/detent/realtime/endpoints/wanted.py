@@ -8,7 +8,7 @@ from detent.realtime.endpoints.pty import PseudoTerminal
 from detent.realtime.endpoints.rfc2217 import Rfc2217Port
 from detent.realtime.endpoints.serialport import SerialPort
 from detent.realtime.endpoints.tcp import TcpAddress, TcpPort
-from detent.uart import Format
+from detent.uart import Chars, Format
 
 _LISTENING = ("tcp", "rfc2217")  # those that are a HOST:PORT
 
@@ -55,14 +55,17 @@ class Wanted(NamedTuple):
             )
         return self
 
-    def open(self, name: str, form: Format) -> Endpoint:
-        """The endpoint, for the line `name` with characters of `form`. Raises EndpointError."""
+    def open(self, name: str, form: Format, parting: Chars = b"") -> Endpoint:
+        """The endpoint, for the line `name` with characters of `form`. Raises EndpointError.
+
+        `parting` is what the line hears when a client leaves, as far as that is seen: on a connection.
+        """
         match self.kind:
             case "pty":
                 return PseudoTerminal(Path(self.where) if self.where else None)
             case "tcp":
-                return TcpPort(TcpAddress.parse(self.where), name)
+                return TcpPort(TcpAddress.parse(self.where), name, parting)
             case "rfc2217":
-                return Rfc2217Port(TcpAddress.parse(self.where), name, form)
+                return Rfc2217Port(TcpAddress.parse(self.where), name, form, parting)
             case _:
                 return SerialPort(self.where, form)

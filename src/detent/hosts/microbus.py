@@ -1,0 +1,154 @@
+"""Talk on a MICROBUS, from the side of its CCU: messages, the answer to status, and how both stay in step.
+
+Nothing marks where a message begins (Cassinis, table 1). A stray byte, or a program that left in the middle of one,
+leaves a drive waiting for the rest: it would take the next question for that, and perhaps move. A drive forgets half a
+message when no byte has come for `SILENCE` seconds (docs/controllers/supersigma.md). So a driver
+
+- keeps silent for so long before its first message, and behind every question that was not answered;
+- asks before it lets a drive move: whoever answers is in step;
+- says a stop at once, and once more when the drive has answered: then it is heard for certain.
+
+Filling the gap with bytes instead would not do: whatever they are, they could be the steps of a movement.
+"""
+
+from typing import Final, NamedTuple
+
+from detent.hosts.errors import BadAnswer, Busy, NoAnswer, Spoken
+from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps, length
+from detent.hosts.interpolation import LARGEST_SPEED, UNIT
+
+MOVE, CONSTANT, LIMIT, ORIGINATE, STATUS, STOP, EMERGENCY = range(1, 8)
+BACKWARD: Final = 0x80
+LARGEST_STEPS: Final = 0xFFFF
+ANSWER: Final = 3  # bytes
+NO_FLAG: Final = 0xE0  # bits of the third that are always 0
+PATIENCE: Final = 0.5  # seconds for the answer to status, beyond what its bytes take
+SILENCE: Final = 0.11  # a drive counts 0.1 s, by a clock of its own
+TRIES: Final = 2
+STOPS: Final = 4  # times that a stop is said before it is given up
+
+
+class Report(NamedTuple):
+    """An answer to status: the steps of the last movement or of the one under way, and the flags."""
+
+    steps: int
+    flags: int
+
+    @property
+    def moving(self) -> bool:
+        """The motor moves."""
+        return bool(self.flags & 0x01)
+
+    @property
+    def end_of_rail(self) -> bool:
+        """The end of the rail was met."""
+        return bool(self.flags & 0x02)
+
+    @property
+    def excessive_force(self) -> bool:
+        """There was excessive force."""
+        return bool(self.flags & 0x04)
+
+    @property
+    def originated(self) -> bool:
+        """The origin has been found."""
+        return bool(self.flags & 0x08)
+
+    @property
+    def refused(self) -> bool:
+        """A command was refused."""
+        return bool(self.flags & 0x10)
+
+
+class BusDriver(Driver):
+    """Who talks on a MICROBUS. Several may share a port."""
+
+    _patience = PATIENCE
+    _in_step = False  # nobody but us has spoken on the bus, as far as is known
+
+    def forget(self) -> None:
+        """The connection was lost: another may have spoken, and half a message may be waiting."""
+        self._in_step = False
+
+    def _silent(self) -> Steps[None]:
+        """Let the drives forget what they may have of a message."""
+        yield Pause(SILENCE)
+        self._in_step = True
+
+    def _status(self, drive: int) -> Steps[Report]:
+        """Status of a drive, asked again behind a silence if it is not answered. Raises NoAnswer, BadAnswer.
+
+        A late answer to an earlier question is not taken for it.
+        """
+        data = message(drive, STATUS)
+        if not self._in_step:
+            yield from self._silent()
+        for left in reversed(range(TRIES)):
+            yield Clear()
+            answer = yield Ask(data, length(ANSWER), self._patience)
+            if answer.whole and not answer.data[2] & NO_FLAG:
+                return Report(int.from_bytes(answer.data[:2], "big"), answer.data[2])
+            self._in_step = False
+            if left:
+                yield from self._silent()
+        spoken = Spoken(data, answer.data)
+        if answer.whole:
+            raise BadAnswer(f"drive {drive}", "its answer to status was damaged", spoken)
+        what = "does not finish its answer" if answer.data else "does not answer status"
+        raise NoAnswer(f"drive {drive}", f"{what} within {self._patience:g} s", spoken)
+
+    def _ready(self, drive: int) -> Steps[Report]:
+        """Status of a drive that is to move: it is at rest, and in step. Raises Busy."""
+        report = yield from self._status(drive)
+        if report.moving:
+            raise Busy(f"drive {drive}", "moves: wait() for its end, or stop() it")
+        return report
+
+    def _stopped(self, drive: int, code: int) -> Steps[None]:
+        """Tell a drive to stop, at once; and again, once it is known to be in step. Raises NoAnswer.
+
+        A stop that is said twice stops once.
+        """
+        data = message(drive, code)
+        for left in reversed(range(STOPS)):
+            yield Ask(data)
+            yield Clear()
+            # at first not long: what did not hear it moves on
+            answer = yield Ask(message(drive, STATUS), length(ANSWER), self._patience / 2**left)
+            if answer.whole and not answer.data[2] & NO_FLAG:
+                self._in_step = True
+                yield Ask(data)
+                return
+            self._in_step = False
+            if left:
+                yield from self._silent()
+        what = f"does not answer: it was told to stop {STOPS} times and may still move"
+        raise NoAnswer(f"drive {drive}", what, Spoken(data, answer.data))
+
+
+def message(drive: int, code: int, steps: int | None = None, speed: int | None = None) -> bytes:
+    """One message (table 1): number, op-code with the direction, steps, speed. Raises ValueError."""
+    data = bytearray([drive_number(drive), code])
+    if steps is not None:
+        if not 1 <= abs(steps) <= LARGEST_STEPS:
+            raise ValueError(f"a movement has 1 to {LARGEST_STEPS} steps, forward (+) or backward (-), not {steps}")
+        data[1] |= BACKWARD if steps < 0 else 0
+        data += abs(steps).to_bytes(2, "big")
+    if speed is not None:
+        data.append(speed_units(speed))
+    return bytes(data)
+
+
+def drive_number(drive: int) -> int:
+    """`drive`, if it can be the number of one. Raises ValueError."""
+    if not 0 <= drive <= 0xFF:
+        raise ValueError(f"a drive has a number of 0 to 255, not {drive}")
+    return drive
+
+
+def speed_units(speed: int) -> int:
+    """The byte of a speed. Raises ValueError for one that it cannot hold."""
+    units, rest = divmod(speed, UNIT)
+    if rest or not 1 <= units <= LARGEST_SPEED:
+        raise ValueError(f"a speed is a multiple of {UNIT} half steps/s up to {LARGEST_SPEED * UNIT}, not {speed}")
+    return units

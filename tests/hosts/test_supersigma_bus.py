@@ -1,0 +1,118 @@
+"""Law: whatever came over the MICROBUS before, a CCU that begins afterwards moves what it says, and stops what it says.
+
+Nothing marks where a message begins (Cassinis, table 1): see `detent.hosts.microbus`.
+"""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from tests.hosts.test_supersigma_cells import positions, robot
+
+from detent.hosts.errors import MotionFailed
+from detent.hosts.supersigma import BlockingCcu, BlockingSupersigma, Ccu, Supersigma
+from detent.ticks import MS, SECOND, US
+
+GARBAGE = st.lists(st.sampled_from([0, 1, 2, 3, 5, 0x81, 0x83, 0xFF]) | st.integers(0, 255), max_size=9).map(bytes)
+MOVES = st.lists(st.tuples(st.integers(1, 3), st.integers(-30, 30).filter(bool)), min_size=1, max_size=4)
+
+
+def check_moves(garbage: bytes, moves: list[tuple[int, int]]) -> None:
+    cell, port = robot(switches=False)
+    cell.send(0, garbage)
+    cell.run_to(cell.now + len(garbage) * 50 * US)
+    ccu = BlockingCcu(Ccu(), port)
+    for drive in (1, 2, 3):  # what the garbage itself has set in motion ends here
+        ccu.stop(drive)
+        while ccu.status(drive).moving:
+            port.wait(0.05)
+    places = positions(cell)
+    for drive, steps in moves:
+        ccu.move(drive, steps)
+        ccu.wait_for(drive)
+        places[drive - 1] += steps
+    cell.run_to(cell.now + 10 * SECOND)
+    assert positions(cell) == places
+
+
+def check_stop(garbage: bytes, after: int) -> None:
+    """A stop of a drive on a long movement, straight behind garbage."""
+    cell, port = robot(switches=False)
+    drive = BlockingSupersigma(Supersigma(1), port)
+    drive.move(60_000)
+    port.wait(after / 1000)
+    cell.send(0, garbage)
+    drive.stop()
+    told = cell.now
+    cell.run_to(told + 400 * MS)  # the ramp takes 0.3 s
+    assert cell.controller("m1").status(cell.now).state == "ready"
+    place = positions(cell)[0]
+    cell.run_to(told + 10 * SECOND)
+    assert positions(cell)[0] == place
+
+
+@given(GARBAGE, MOVES)
+@settings(max_examples=40)
+def test_whatever_came_before_a_ccu_moves_what_it_says(garbage: bytes, moves: list[tuple[int, int]]) -> None:
+    check_moves(garbage, moves)
+
+
+@given(GARBAGE, st.integers(0, 2000))
+@settings(max_examples=40)
+def test_whatever_came_before_a_stop_stops(garbage: bytes, after: int) -> None:
+    check_stop(garbage, after)
+
+
+@pytest.mark.slow
+@given(GARBAGE, MOVES)
+@settings(max_examples=10_000)
+def test_whatever_came_before_a_ccu_moves_what_it_says_at_length(garbage: bytes, moves: list[tuple[int, int]]) -> None:
+    check_moves(garbage, moves)
+
+
+@pytest.mark.slow
+@given(GARBAGE, st.integers(0, 2000))
+@settings(max_examples=10_000)
+def test_whatever_came_before_a_stop_stops_at_length(garbage: bytes, after: int) -> None:
+    check_stop(garbage, after)
+
+
+def test_a_stray_byte_costs_a_question_and_moves_nothing() -> None:
+    """Without the silence the question for status of drive 1 would be half a movement of drive 2."""
+    cell, port = robot(switches=False)
+    ccu = BlockingCcu(Ccu(), port)
+    assert not ccu.status(1).moving
+    cell.send(0, b"\x02")
+    begin = cell.now
+    assert not ccu.status(1).moving
+    assert cell.now - begin < SECOND
+    ccu.move_all({1: 7, 2: -9})
+    assert positions(cell) == [7, -9, 0]
+
+
+def test_a_stop_that_is_never_answered_is_an_error() -> None:
+    _, port = robot()
+    with pytest.raises(TimeoutError, match="drive 9: does not answer: it was told to stop 4 times and may still move"):
+        BlockingCcu(Ccu(), port).stop(9)
+
+
+def test_a_movement_of_no_steps_is_refused_and_told() -> None:
+    cell, port = robot()
+    cell.type("m1", "move +0")
+    cell.run_to(SECOND)
+    drive = BlockingSupersigma(Supersigma(1), port)
+    with pytest.raises(MotionFailed, match="drive 1: refused a command"):
+        drive.wait()
+    with pytest.raises(ValueError, match="a movement has 1 to 65535 steps"):
+        drive.move(0)
+
+
+@pytest.mark.parametrize(("limit", "fastest"), [(300, 300), (600, 600), (700, 700)])
+def test_a_limit_is_kept_below_the_lowest_speed_of_the_ramps_too(limit: int, fastest: int) -> None:
+    cell, port = robot(switches=False)
+    drive = BlockingSupersigma(Supersigma(1), port)
+    drive.move(500, limit=limit)
+    drive.wait()
+    assert cell.recording is not None
+    (span,) = cell.recording.motion("m1", cell.now)
+    times = span.train.times(1, 500)
+    assert (times[1:] - times[:-1]).min() >= SECOND / fastest * 0.999
