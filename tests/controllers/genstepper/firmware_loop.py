@@ -3,6 +3,8 @@
 Written from the manual and from how it is read (docs/controllers/genstepper.md), without segments or closed forms.
 """
 
+import copy
+
 from detent.ticks import US
 
 TICK = 16 * US
@@ -20,16 +22,31 @@ class LoopMotor:
         self.speed = self.travel = 0  # travel: the fraction of a step, in the direction of motion
         self.braking = False
         self.next = None
+        self.closed = {1: False, -1: False}  # the limits
+        self.floor = (0, 0)  # slope and stop rate that a stop at a limit does not fall below
+        self.key = None  # what slew keys ask for: a direction, 0 for both at once
         self.steps: list[tuple[int, int]] = []
 
     # commands, between two ticks
 
     def go(self, target):
+        if self.key is not None:
+            return
         self.target = target
         if self.state == "idle":
             self.begin_go()
         else:
             self.begin_stop(("go",))
+            if self.next and self.closed[self.direction] and self.direction * (target - self.stops_at()) > 0:
+                self.next = None
+
+    def stops_at(self):
+        """Where the stop under way ends: by doing it."""
+        twin = copy.deepcopy(self)
+        twin.next = twin.key = None
+        while twin.state != "idle":
+            twin.tick()
+        return twin.position
 
     def go_relative(self, steps):
         going = self.state == "go" or self.next == ("go",)
@@ -39,7 +56,10 @@ class LoopMotor:
         if self.state == "idle":
             self.begin_slew(direction)
         elif self.direction == direction:
-            self.state, self.next = "slew", None
+            if self.closed[direction]:
+                self.begin_stop(None)
+            else:
+                self.state, self.next, self.floor = "slew", None, (0, 0)
         else:
             self.begin_stop(("slew", direction))
 
@@ -56,17 +76,40 @@ class LoopMotor:
         self.position = position
         self.stop()
 
+    def limit(self, direction, closed):
+        reached = closed and not self.closed[direction]
+        self.closed[direction] = closed
+        if reached and self.state != "idle" and self.direction == direction:
+            self.floor = (self.slope, self.keep)
+            self.stop()
+        self.look_at_key()
+
+    def press(self, key):
+        if key != self.key:
+            self.key = key
+            if key:
+                self.slew(key)
+            else:
+                self.stop()
+
+    def look_at_key(self):
+        if self.key and self.state == "idle" and not self.closed[self.key]:
+            self.begin_slew(self.key)
+
     def begin_go(self):
         distance = self.target - self.position
         self.state, self.next = "idle", None
-        if distance:
-            self.state, self.direction = "go", 1 if distance > 0 else -1
+        if distance and not self.closed[1 if distance > 0 else -1]:
+            self.state, self.direction, self.floor = "go", 1 if distance > 0 else -1, (0, 0)
             self.go_rate, self.go_keep, self.go_slope = self.rate, self.keep, self.slope
             self.speed, self.travel = min(self.keep, self.rate) * PER_SECOND, 0
             self.braking = False
 
     def begin_slew(self, direction):
-        self.state, self.direction, self.next = "slew", direction, None
+        self.state, self.next = "idle", None
+        if self.closed[direction]:
+            return
+        self.state, self.direction, self.floor = "slew", direction, (0, 0)
         self.speed, self.travel = min(self.keep, self.rate) * PER_SECOND, 0
 
     def begin_stop(self, then):
@@ -74,12 +117,13 @@ class LoopMotor:
         self.maybe_stopped()
 
     def maybe_stopped(self):
-        if self.speed <= self.keep * PER_SECOND:
+        if self.speed <= max(self.keep, self.floor[1]) * PER_SECOND:
             then, self.state, self.next = self.next, "idle", None
             if then == ("go",):
                 self.begin_go()
             elif then:
                 self.begin_slew(then[1])
+            self.look_at_key()
 
     # time
 
@@ -101,7 +145,7 @@ class LoopMotor:
             wanted = self.rate * PER_SECOND
             v = min(v + self.slope, wanted) if v < wanted else max(v - self.slope, wanted)
         else:
-            v = max(v - self.slope, self.keep * PER_SECOND)
+            v = max(v - max(self.slope, self.floor[0]), max(self.keep, self.floor[1]) * PER_SECOND)
         self.speed = v
         self.travel += v
         if self.travel >= PER_SECOND**2:
@@ -110,6 +154,7 @@ class LoopMotor:
             self.steps.append((self.zero + self.ticks * TICK, self.direction))
         if self.state == "go" and self.position == self.target:
             self.state = "idle"
+            self.look_at_key()
         elif self.state == "stop":
             self.maybe_stopped()
 

@@ -84,6 +84,6 @@ def test_the_windings_can_be_asked_for_at_every_step():
     board.say("X40=4000R100G", 2 * SECOND)
     times = [at for at, _ in board.pulses()]
     asked = duties(board.cell.recording, "board", "X", [times[0] - 1, *times[:-1], times[-1] + 16_000])
-    assert asked[0] == table(3, 160)
-    assert asked[1:-1] == [table(3, 4 * position) for position in range(41, 100)]
+    assert asked[0] == table(3, 0), "= moves no field (page 38)"
+    assert asked[1:-1] == [table(3, 4 * step) for step in range(1, 60)]
     assert asked[-1] == NOTHING, "off when it is idle"

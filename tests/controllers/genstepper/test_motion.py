@@ -21,7 +21,24 @@ orders = st.one_of(
     st.tuples(st.just("P"), st.sampled_from((900, 5000, 20_000, 62_500))),
     st.tuples(st.just("K"), st.sampled_from((20, 80, 500))),
     st.tuples(st.just("="), small),
+    st.tuples(st.sampled_from(("LX+", "LX-")), st.sampled_from((0, 0, 1))),
+    st.tuples(st.just("key"), st.sampled_from((None, None, 1, -1, 0))),
 )
+
+
+def do(board: Board, loop: LoopMotor, letter: str, value: object) -> None:
+    """One thing reaches the board and the loop."""
+    if letter == "key":
+        for pin, ways in (("X+", (1, 0)), ("X-", (-1, 0))):
+            board.pin(pin, 0 if value in ways else 1)
+            held = {pin for pin in ("X+", "X-") if board.unit._inputs[pin] == 0}
+            loop.press((("X+" in held) - ("X-" in held)) if held else None)
+    elif letter in ("LX+", "LX-"):
+        board.pin(letter, value)
+        loop.limit(1 if letter == "LX+" else -1, value == 0)
+    else:
+        board.send(f"{value}{letter}")
+        obey(loop, letter, value)
 
 
 def obey(loop: LoopMotor, letter: str, value: object) -> None:
@@ -30,7 +47,7 @@ def obey(loop: LoopMotor, letter: str, value: object) -> None:
             loop.go(value)
         case "S", int():
             loop.go_relative(value)
-        case "S", _:
+        case "S", _ if loop.key is None:
             loop.slew(1 if value == "+" else -1)
         case "Z", _:
             loop.stop()
@@ -44,17 +61,30 @@ def obey(loop: LoopMotor, letter: str, value: object) -> None:
             loop.set_position(value)
 
 
-@settings(max_examples=50, deadline=None)
-@given(st.lists(st.tuples(orders, st.integers(1, 120_000_000)), min_size=1, max_size=8))
-def test_commands_in_motion_give_the_steps_of_the_tick_by_tick_loop(story):
+stories = st.lists(st.tuples(orders, st.integers(1, 120_000_000)), min_size=1, max_size=8)
+
+
+@settings(max_examples=60, deadline=None)
+@given(stories)
+def test_whatever_comes_in_motion_gives_the_steps_of_the_tick_by_tick_loop(story):
+    check_against_the_loop(story)
+
+
+@pytest.mark.slow
+@settings(max_examples=2_000, deadline=None)
+@given(stories)
+def test_whatever_comes_in_motion_gives_the_steps_of_the_tick_by_tick_loop_many_times(story):
+    check_against_the_loop(story)
+
+
+def check_against_the_loop(story):
     board = BOARD.copy()
     loop = LoopMotor(0)
     board.send("X")
     board.run(1 * MS)
     for (letter, value), wait in story:
         loop.run_to(board.cell.now)
-        board.send(f"{value}{letter}")
-        obey(loop, letter, value)
+        do(board, loop, letter, value)
         board.cell.run_to(board.cell.now + wait)
     board.cell.run_to(board.cell.now + 150 * MS)
     loop.run_to(board.cell.now)

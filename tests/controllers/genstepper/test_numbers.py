@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from tests.controllers.genstepper.boards import Board
 
 from detent.controllers.genstepper.link import LARGEST, Value, answer, undress
+from detent.ticks import SECOND
 
 
 def typed(text: str) -> Value:
@@ -26,12 +27,38 @@ def test_page_24_a_number_is_what_was_typed_last(text, number):
     assert typed(text).number() == number
 
 
-def test_page_24_a_sign_alone_is_a_direction_until_a_command_or_a_digit_comes():
+def test_page_24_a_sign_alone_is_a_direction_until_a_digit_comes():
     assert typed("-").slew() == -1
     assert typed("+").slew() == 1
     assert typed("250-").slew() == -1
-    for text in ("", "0", "-3", "- ", "-X"):
+    for text in ("", "0", "-3", "- 3", "-X0"):
         assert typed(text).slew() == 0, text
+
+
+@pytest.mark.parametrize("between", ["X", "Y", "B", " ", "\r", "Z", "R", "L", "?", "Q", "XYB Z"])
+def test_pages_22_and_23_the_value_remains_unchanged_between_commands_a_sign_alone_too(between):
+    value = typed(f"-{between}")
+    assert value.slew() == -1
+    assert value.number() == 0, "for every other command it is no digits"
+    assert value.slew() == -1
+
+
+@pytest.mark.parametrize(
+    ("said", "ways"),
+    [
+        ("X-SYS", (-1, -1)),
+        ("-XS", (-1, 0)),
+        ("-BS", (-1, -1)),
+        ("Y+S-XS", (-1, 1)),
+        ("X+SZYS", (None, 1)),
+        ("-X5S", (5, 0)),
+    ],
+)
+def test_page_22_a_sign_serves_several_commands(said, ways):
+    board = Board()
+    board.say(said, SECOND)
+    for axis, way in zip("XY", ways, strict=True):
+        assert way is None or board.position(axis) == way or board.position(axis) * way > 100 > 5 > way, axis
 
 
 def test_a_sign_that_has_slewed_slews_again_and_does_not_belong_to_the_next_number():

@@ -13,7 +13,7 @@ from detent.ticks import MS, SECOND
 def test_page_15_power_on_and_page_40_all_reports_of_both_motors():
     board = Board()
     assert board.say("0?") == "\r\nX,0,0,80,8000,0,80,0,0,0,3,800,80\r\nY,0,0,80,8000,0,80,0,0,0,3,800,80\r\n*"
-    assert board.say("0V") == "*"
+    assert board.say("0V") == "\r\n*", "page 35: CR LF comes as soon as V is recognised"
     assert board.say("-1?") == "X,-1,0\r\nY,-1,0*"
     assert board.say("Y-10?") == "*Y,-10,800*" or board.say("Y-10?") == "Y,-10,800*"
     assert board.report(252) == 3072 // 256

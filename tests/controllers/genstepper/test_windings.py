@@ -142,7 +142,7 @@ def test_page_75_double_current_the_y_connector_carries_what_x_gets():
 def test_page_39_memory_locations_show_the_windings_and_rotors():
     board = Board()
     board.say("8!", 300 * MS)
-    board.say("B1WX0OX33=Y-1=")
+    board.say("B1WX0OX33GY-1GB", 2 * SECOND)
     assert board.report(253) == 8
     assert board.report(125, "X") == board.report(125, "Y") == 264 % 256
     assert board.report(61) == 248

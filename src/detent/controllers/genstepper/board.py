@@ -8,10 +8,10 @@ from enum import Enum
 from typing import Any
 
 from detent.axis import Axis
-from detent.controllers.device import DriveSet, Output, Powered, Status, Stop
+from detent.controllers.device import DriveSet, Output, Powered, Refused, Status, Stop
 from detent.controllers.genstepper import link, pins, reports
 from detent.controllers.genstepper.direct import Direct
-from detent.controllers.genstepper.inputs import FIRST_RATE, STANDARD_RATES, Limits, key
+from detent.controllers.genstepper.inputs import FIRST_RATE, STANDARD_RATES, Keys, Limits, keys
 from detent.controllers.genstepper.motor import Motor
 from detent.controllers.genstepper.pins import AXES, Order
 from detent.controllers.genstepper.prompter import Prompter
@@ -76,7 +76,9 @@ class Board:
         self._auto = high_byte(order.auto_rate)
         self._step_size = step_size
         self._rate_place = FIRST_RATE
-        self._keys = dict.fromkeys(AXES, 0)  # what the slew keys asked for when last looked at
+        self._keys = dict.fromkeys(AXES, Keys.NONE)  # as they were when last looked at
+        self._unheeded: tuple[str, ...] = ()  # motors that were halted under a held key
+        self._lost = ""  # what came while the board was deaf
         self._drives: dict[str, DriveSet] = {}  # what was last told of each connector
         self._wakes: Ns = NEVER
 
@@ -219,8 +221,8 @@ class Board:
             found.append(limit)
         if not self._direct.on and self._order.slew_inputs and motor.stops_at_once(now):
             for pin in (f"{axis}-", f"{axis}+"):
-                asked = key({**inputs, pin: inputs[pin] ^ 1}, axis)
-                if asked != self._keys[axis] and asked != motor.direction:
+                asked = keys({**inputs, pin: inputs[pin] ^ 1}, axis)
+                if asked is not self._keys[axis] and asked.value != motor.direction:
                     found.append(Stop(pin, inputs[pin] ^ 1))
         return found
 
@@ -230,8 +232,9 @@ class Board:
         return (f"L{axis}-", f"L{axis}+")
 
     def halt(self, now: Ns) -> None:
-        """Both motors stop at once."""
+        """Both motors stop at once. A slew key that is held then counts again when it has been let go."""
         self.advance(now)
+        self._unheeded = AXES
         for motor in self._motors.values():
             motor.halt(now)
         self._settle(now)
@@ -247,7 +250,7 @@ class Board:
         told = self._drive_of(connector, now)
         motor = self._motors[told.axis]
         rate = 0 if motor.idle else motor.speed(now)
-        return told.drive.duties(motor.position(now), rate)  # type: ignore[return-value]
+        return told.drive.duties(motor.field(now), rate)  # type: ignore[return-value]
 
     def _next(self) -> Ns:
         motors = self._motors
@@ -269,40 +272,53 @@ class Board:
         self._wakes = NEVER
         self._phase = Phase.READY
         self._prompter.answer(link.answer(reports.VERSION_TEXT, self._verbose), now)
+        if self._lost:
+            self._out.append(
+                Refused(now, self._lost, "lost: deaf for 250 ms after a reset; wait for its prompt (page 22)")
+            )
+            self._lost = ""
         if self._order.e_mode:
             self._choose_direct(self._order.e_mode, now)
-        self._look_at_keys(now)
 
     # -- inputs ------------------------------------------------------------------------------------------
 
     def _input_changed(self, pin: str, level: Level, now: Ns) -> None:
-        if pin == "NXT":
-            if level == LOW:
-                self._next_rate(now)
-        elif pin in pins.LIMITS:
+        if pin in pins.LIMITS:
             self._look_at_limits(now)
         elif self._direct.on:
             self._direct.changed(pin, now)
-        else:
-            self._look_at_keys(now)
+        elif pin == "NXT" and level == LOW:
+            self._next_rate(now)
 
     def _look_at_limits(self, now: Ns) -> None:
         for motor in self._motors.values():
             motor.look_at_limit(now)
 
     def _look_at_keys(self, now: Ns) -> None:
-        """A key that was pressed slews, one that was let go stops, both of a pair stop (page 21)."""
-        if self._direct.on or not self._order.slew_inputs:
+        """A key slews its motor as long as it is held and stops it when it is let go; both of a pair stop it (page 21).
+
+        What stops a motor under a held key (Z, =, a limit) brings it to rest; from there it slews again, as soon as
+        there is a way.
+        """
+        if self._phase is not Phase.READY:
             return
         for axis, motor in self._motors.items():
-            asked = key(self._inputs, axis)
-            if asked == self._keys[axis]:
-                continue
+            asked, before = self._held(axis), self._keys[axis]
             self._keys[axis] = asked
-            if asked:
-                motor.slew(asked, now)
-            else:
-                motor.stop(now)
+            if asked is not before:
+                self._unheeded = tuple(name for name in self._unheeded if name != axis)
+                if asked.value:
+                    motor.slew(asked.value, now)
+                else:
+                    motor.stop(now)
+            elif (
+                asked.value and motor.idle and axis not in self._unheeded and not self._limits.closed(axis, asked.value)
+            ):
+                motor.slew(asked.value, now)
+
+    def _held(self, axis: str) -> Keys:
+        """The slew keys of an axis that are held; none where they are no slew keys (E mode, NOSLEW)."""
+        return Keys.NONE if self._direct.on or not self._order.slew_inputs else keys(self._inputs, axis)
 
     def _next_rate(self, now: Ns) -> None:
         self._rate_place = (self._rate_place + 1) % len(STANDARD_RATES)
@@ -315,8 +331,7 @@ class Board:
             motor.halt(now)
         self._direct.choose(bits)
         self._limits.switch(self._direct.on and (self._direct.currents or not self._order.hard_stop))
-        self._keys = dict.fromkeys(AXES, 0)
-        self._look_at_keys(now)
+        self._keys = dict.fromkeys(AXES, Keys.NONE)
 
     def _steps(self, now: Ns) -> None:
         for step in self._direct.advance(now):
@@ -326,9 +341,10 @@ class Board:
     # -- after every event -------------------------------------------------------------------------------
 
     def _settle(self, now: Ns) -> None:
-        """RDY, an I that waited, and the windings, as they follow from what has happened."""
+        """Slew keys, RDY, an I that waited, and the windings, as they follow from what has happened."""
         if self._phase is Phase.OFF:
             return
+        self._look_at_keys(now)
         idle = all(motor.idle for motor in self._motors.values())
         self._driver.set("RDY", HIGH if idle and not self._direct.on else LOW, now)
         if self._waiting and self._may_answer():
@@ -362,7 +378,7 @@ class Board:
         elif self._direct.currents:
             halves = self._direct.power(axis)
             found = found._replace(sixteenths=(16 if halves == 2 else 8 if halves else 0))
-        return DriveSet(now, connector, axis, motor.origin, found)
+        return DriveSet(now, connector, axis, motor.field_origin, found)
 
     # -- what `?` reads of it ----------------------------------------------------------------------------
 
@@ -377,7 +393,7 @@ class Board:
                 return self.duties("X", now).pattern | self.duties("Y", now).pattern << 4
             case 61 | 125:
                 motor = self._motors["Y" if address == 61 else "X"]
-                return motor.position(now) * self._step_size % CYCLE
+                return motor.field(now) * self._step_size % CYCLE
             case 252:
                 return self._auto
             case 253:

@@ -33,6 +33,8 @@ class GenStepper(Board):
                 if char.framing_ok and char.parity_ok:
                     self._take(chr(char.value), now)
                     self._settle(now)
+            elif self._phase is not Phase.OFF and char.framing_ok and char.parity_ok:
+                self._lost += chr(char.value)
 
     def frame(self, text: str) -> bytes:
         """Commands as they are typed: there is nothing to add."""
@@ -75,6 +77,7 @@ class GenStepper(Board):
         if self._value.take(character):
             return
         row = commands.row(character)
+        verbose = self._verbose  # CR LF comes before the command is processed, by what V was until then (page 35)
         lines: Sequence[str] | None = ()
         if row is None:
             self._value.number()
@@ -85,10 +88,23 @@ class GenStepper(Board):
                 self._direct.blind(now)
             lines = self._OBEY[row.op](self, now)
         if lines is not None:
-            self._prompter.answer(link.answer(lines, self._verbose), now)
+            self._prompter.answer(link.answer(lines, verbose), now)
 
     def _each(self) -> list[Motor]:
         return [self._motors[axis] for axis in self._selected]
+
+    def _movable(self, op: Op, now: Ns) -> list[Motor]:
+        """The motors that a G, S or M moves: none in E mode, none whose slew key is held.
+
+        "If button control is performed while a goto is underway the goto gets changed to a direction slew" (page 22).
+        """
+        if self._direct.on:
+            return []
+        for axis in self._selected:
+            if self._held(axis).held:
+                reason = f"{axis} moves as its slew keys say, as long as one is held (pages 21, 22, 60)"
+                self._out.append(Refused(now, op.value, reason))
+        return [motor for motor in self._each() if not self._held(motor.name).held]
 
     def _refuse(self, op: Op, number: int, takes: str, now: Ns) -> None:
         self._out.append(Refused(now, f"{number}{op.value}", f"{op.value} takes {takes}: nothing changes"))
@@ -119,9 +135,8 @@ class GenStepper(Board):
 
     def _go(self, now: Ns) -> Sequence[str]:
         target = self._value.number()
-        if not self._direct.on:
-            for motor in self._each():
-                motor.go(target, now)
+        for motor in self._movable(Op.GO, now):
+            motor.go(target, now)
         return ()
 
     def _half_power(self, now: Ns) -> Sequence[str]:
@@ -162,12 +177,13 @@ class GenStepper(Board):
 
     def _mark(self, now: Ns) -> Sequence[str]:
         number = self._value.number()
-        for motor in self._each():
-            if number == 0:
+        if number == 0:
+            for motor in self._each():
                 motor.mark = motor.position(now)
-            elif number == 1 and not self._direct.on:
+        elif number == 1:
+            for motor in self._movable(Op.MARK, now):
                 motor.go(motor.mark, now)
-        if number not in (0, 1):
+        else:
             self._refuse(Op.MARK, number, "0 or 1", now)
         return ()
 
@@ -182,10 +198,8 @@ class GenStepper(Board):
 
     def _slew(self, now: Ns) -> Sequence[str]:
         direction = self._value.slew()
-        if self._direct.on:
-            return ()
         steps = 0 if direction else self._value.number()
-        for motor in self._each():
+        for motor in self._movable(Op.SLEW, now):
             if direction:
                 motor.slew(direction, now)
             else:

@@ -1,6 +1,7 @@
 """Limit switches, slew keys and the rate key: the TTL inputs outside E mode (manual, pages 19 to 21, 34)."""
 
 from collections.abc import Mapping
+from enum import Enum
 
 from detent.controllers.device import Stop
 from detent.controllers.genstepper.pins import LIMITS
@@ -37,15 +38,19 @@ class Limits:
 
     def meets(self, axis: str, direction: int) -> bool:
         """Whether a step action of `axis` in `direction` runs into its limit, which is latched then."""
-        stop = self.ahead(axis, direction)
-        if stop is None or self._inputs[stop.pin] != stop.level:
+        if not self.closed(axis, direction):
             return False
-        self.latches |= 1 << LIMITS.index(stop.pin)
+        self.latches |= 1 << LIMITS.index(_pin(axis, direction))
         return True
+
+    def closed(self, axis: str, direction: int) -> bool:
+        """Whether the limit of `axis` in `direction` is active; nothing is latched."""
+        stop = self.ahead(axis, direction)
+        return stop is not None and self._inputs[stop.pin] == stop.level
 
     def ahead(self, axis: str, direction: int) -> Stop | None:
         """The limit of `axis` in `direction`, at the level that makes it active; None where it counts for nothing."""
-        pin = f"L{axis}{'+' if direction > 0 else '-'}"
+        pin = _pin(axis, direction)
         place = LIMITS.index(pin)
         if self._off or self._mask >> place & 1:
             return None
@@ -57,6 +62,25 @@ class Limits:
         return latched
 
 
-def key(inputs: Mapping[str, Level], axis: str) -> int:
-    """The direction that the slew keys of an axis ask for; 0 for none, or both."""
-    return (inputs[f"{axis}+"] == LOW) - (inputs[f"{axis}-"] == LOW)
+def _pin(axis: str, direction: int) -> str:
+    return f"L{axis}{'+' if direction > 0 else '-'}"
+
+
+class Keys(Enum):
+    """What the slew keys of an axis ask for, as long as they are held (pages 21, 60); the values are directions."""
+
+    NONE = None
+    BOTH = 0  # "are treated as stop to avoid confusion"
+    PLUS = 1
+    MINUS = -1
+
+    @property
+    def held(self) -> bool:
+        """Whether there is one at ground level."""
+        return self is not Keys.NONE
+
+
+def keys(inputs: Mapping[str, Level], axis: str) -> Keys:
+    """The slew keys of an axis."""
+    plus, minus = inputs[f"{axis}+"] == LOW, inputs[f"{axis}-"] == LOW
+    return Keys(plus - minus) if plus or minus else Keys.NONE

@@ -30,7 +30,7 @@ class Value:
         self._number = 0
         self._sign = 1
         self._typing = False  # the next digit belongs to this number
-        self._alone = False  # it is a sign alone: "set no value yet"
+        self._alone = False  # it is a sign alone: "set no value yet", for every S until another number comes
 
     def take(self, character: str) -> bool:
         """Take a digit or a sign; False for any other character."""
@@ -51,8 +51,11 @@ class Value:
         return self._sign if self._alone else 0
 
     def number(self) -> int:
-        """For any other command: the number; a sign alone counts as 0, from now on."""
-        self._typing = self._alone = False
+        """For any other command: the number; a sign alone counts as 0.
+
+        It is not lost by that: "the current value remains unchanged between commands" (page 22).
+        """
+        self._typing = False
         return self._sign * self._number
 
 

@@ -2,6 +2,9 @@
 
 The motor is always in one `Action` with one `Plan` of `ramps.tick_accumulator`. A command that comes in motion
 takes the accumulators as they are on the tick, and plans on from there. Ticks are counted from the reset.
+
+A limit that closes ahead is a Z (page 12): whatever was to follow the ramp-down is dropped, and as long as the limit
+is closed nothing that is asked for leads on towards it.
 """
 
 from enum import Enum
@@ -36,12 +39,15 @@ class Motor:
         "_begin_tick",
         "_braking_slope",
         "_ends_at",
+        "_field",
+        "_floor",
         "_go_keep",
         "_go_run",
         "_limit_tick",
         "_limits",
         "_origin",
         "_plan",
+        "_shut",
         "_time_zero",
         "action",
         "deadline",
@@ -66,7 +72,7 @@ class Motor:
         if self._axis.moving:
             self._axis.cut(now)
         self._time_zero = now
-        self._origin = self._axis.shaft
+        self._origin = self._field = self._axis.shaft
         self.action = Action.IDLE
         self.deadline: Ns = NEVER
         self.direction = 1
@@ -78,6 +84,8 @@ class Motor:
         self._ends_at: Ns = NEVER
         self._go_run = self._go_keep = self._braking_slope = 0  # as they were when G was given
         self._limit_tick = -1  # the tick before which a limit was seen
+        self._shut = False  # the limit ahead was closed when last looked at
+        self._floor = (0, 0)  # slope and stop OK rate that a stop at a limit does not fall below
 
     # -- where it is -------------------------------------------------------------------------------------
 
@@ -87,9 +95,16 @@ class Motor:
         return self.action is Action.IDLE
 
     @property
-    def origin(self) -> int:
-        """The place of the shaft that is location 0."""
-        return self._origin
+    def field_origin(self) -> int:
+        """The place of the shaft with the field at the begin of its cycle: where it stood at the reset.
+
+        = does not move it: "no actual motor motion is involved" (page 38).
+        """
+        return self._field
+
+    def field(self, now: Ns) -> int:
+        """How far the field has come since the reset, in microsteps."""
+        return self._axis.shaft_at(now) - self._field
 
     def position(self, now: Ns) -> int:
         """The location, in microsteps."""
@@ -139,25 +154,33 @@ class Motor:
     # -- commands ----------------------------------------------------------------------------------------
 
     def go(self, target: int, now: Ns) -> None:
-        """Go to a position; from a motion by way of a stop ("The code ALWAYS starts from a stop")."""
+        """Go to a position; from a motion by way of a stop ("The code ALWAYS starts from a stop").
+
+        To a place beyond the stop, towards a limit that is closed, it does not go on: there is no step towards one.
+        """
         self.target = saturated(target)
         if self.action is Action.IDLE:
             self._start_go(self._tick(now), now)
-        else:
-            self._stop_for(Action.TURNING, now)
+            return
+        self._stop_for(Action.TURNING, now)
+        if self.action is Action.TURNING and self._leads_on(now) and self._limits.meets(self.name, self.direction):
+            self.action = Action.STOPPING
 
     def go_relative(self, steps: int, now: Ns) -> None:
         """Go so far from the target of a motion that has one, else from here (page 33)."""
         self.go(self.seen_target(now) + steps, now)
 
     def slew(self, direction: int, now: Ns) -> None:
-        """Go in a direction until stopped."""
+        """Go in a direction until stopped; not on towards a limit that is closed."""
         if self.action is Action.IDLE:
             self._start_slew(direction, self._tick(now), now)
-        elif direction == self.direction:
-            self._continue_slew(now)
-        else:
+        elif direction != self.direction:
             self._stop_for(Action.REVERSING, now)
+        elif self._limits.meets(self.name, direction):
+            self._stop_for(Action.STOPPING, now)
+        else:
+            self._floor = (0, 0)
+            self._continue_slew(now)
 
     def stop(self, now: Ns) -> None:
         """Z: down the ramp to the stop OK rate."""
@@ -171,18 +194,25 @@ class Motor:
         self._rest()
 
     def displace(self, by: int) -> None:
-        """The shaft, at rest, is `by` microsteps from where it was thought to be."""
+        """The shaft, at rest, is `by` microsteps from where it was thought to be. The field stays as it is."""
         self._axis.displace(by)
+        self._field += by
 
     def look_at_limit(self, now: Ns) -> None:
-        """A limit may have closed: one ahead is latched, and stops what goes on towards it, softly or at once."""
-        if self.action is Action.IDLE or not self._limits.meets(self.name, self.direction):
+        """A limit may have closed: one ahead is latched, and stops the motor at once or as Z does (page 12).
+
+        So it ends what was to follow a stop under way, too. That stop is not made longer by a P or K that comes then.
+        """
+        if self.action is Action.IDLE:
             return
+        before, self._shut = self._shut, self._limits.meets(self.name, self.direction)
+        if not self._shut or before:
+            return
+        self._limit_tick = self._tick(now)
         if self._limits.hard:
-            self._limit_tick = self._tick(now)
             self.halt(now)
-        elif self.action in (Action.GOING, Action.SLEWING):
-            self._limit_tick = self._tick(now)
+        else:
+            self._floor = (self.slope, self.keep)
             self.stop(now)
 
     @property
@@ -192,14 +222,11 @@ class Motor:
 
     def stops_at_once(self, now: Ns) -> bool:
         """Whether a stop that begins at `now` makes no further step."""
-        point = self._point(now)
-        return not stopping(point.phase, point.speed, self.slope, self.keep, self._room(self.direction, now)).steps
+        return not self._stop_plan(now).steps
 
     def cut_by_limit(self, now: Ns) -> bool:
         """Whether a limit ahead that closes at `now` ends the steps with the one before."""
-        if self._limits.hard:
-            return True
-        return self.action in (Action.GOING, Action.SLEWING) and self.stops_at_once(now)
+        return self._limits.hard or self.stops_at_once(now)
 
     def set_rate(self, rate: int, now: Ns) -> None:
         """R: a plain slew follows at once, anything else from its next motion on."""
@@ -224,7 +251,7 @@ class Motor:
             self._stop_for(self.action, now)
 
     def set_position(self, position: int, now: Ns) -> None:
-        """=: this place is `position`; then the motor stops."""
+        """=: this place is `position`; then the motor stops. Neither the shaft nor the field moves for it."""
         self._origin = self._axis.shaft_at(now) - position
         self.stop(now)
 
@@ -270,7 +297,7 @@ class Motor:
             self._rest()
             return
         self._go_run, self._go_keep, self._braking_slope = self.rate, self.keep, self.slope
-        self.direction = 1 if distance > 0 else -1
+        self._turn(1 if distance > 0 else -1)
         if self._barred(tick):
             return
         speed = min(self._go_keep, self._go_run) * UPDATES
@@ -290,7 +317,7 @@ class Motor:
         )  # fmt: skip
 
     def _start_slew(self, direction: int, tick: int, now: Ns) -> None:
-        self.direction = direction
+        self._turn(direction)
         if self._barred(tick):
             return
         room = self._room(direction, now)
@@ -299,6 +326,17 @@ class Motor:
             return
         speed = min(self.keep, self.rate) * UPDATES
         self._follow(Action.SLEWING, slewing(0, speed, self.rate, self.slope, room), tick, now)
+
+    def _turn(self, direction: int) -> None:
+        """From rest, in a direction."""
+        self.direction = direction
+        self._shut, self._floor = False, (0, 0)
+
+    def _leads_on(self, now: Ns) -> bool:
+        """Whether the target lies beyond the place at which the stop ends that begins at `now`."""
+        assert self._plan is not None
+        rest = self.position(now) + self.direction * self._plan.steps
+        return self.direction * (self.target - rest) > 0
 
     def _barred(self, tick: int) -> bool:
         """Whether the limit ahead is active already: then there is no step, it is latched, the motor idle."""
@@ -315,9 +353,12 @@ class Motor:
 
     def _stop_for(self, action: Action, now: Ns) -> None:
         """Stop, then do what `action` says."""
-        point = self._point(now)
-        plan = stopping(point.phase, point.speed, self.slope, self.keep, self._room(self.direction, now))
-        self._follow(action, plan, self._tick(now), now)
+        self._follow(action, self._stop_plan(now), self._tick(now), now)
+
+    def _stop_plan(self, now: Ns) -> Plan:
+        point, (slope, keep) = self._point(now), self._floor
+        room = self._room(self.direction, now)
+        return stopping(point.phase, point.speed, max(self.slope, slope), max(self.keep, keep), room)
 
     def _follow(self, action: Action, plan: Plan, tick: int, now: Ns) -> None:
         """Do what `plan` says, from `tick` on, which is not after `now`."""

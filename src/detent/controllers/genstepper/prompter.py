@@ -16,14 +16,14 @@ MORE_STOP_BITS = 2
 class Prompter:
     """The sending half of the serial port. `deadline` says when to call `advance`."""
 
-    __slots__ = ("_delay", "_due", "_form", "_pending", "_slow", "_timed", "_transmitter")
+    __slots__ = ("_delay", "_due", "_form", "_pending", "_slow", "_slow_next", "_timed", "_transmitter")
 
     def __init__(self, port: str, form: Format, out: Outbox, *, timed: bool) -> None:
         self._form, self._timed = form, timed
         self._transmitter = Transmitter(port, form, out, timed=timed)
         self._pending = b""
         self._due: Ns = NEVER  # when the pending answer goes out
-        self._slow = False
+        self._slow = self._slow_next = False
         self._delay: Ns = 0
 
     @property
@@ -32,13 +32,8 @@ class Prompter:
         return min(self._due, self._transmitter.deadline)
 
     def verbose(self, bits: int) -> None:
-        """V: bit 1 chooses later and slower answers. What has not begun must have been discarded."""
-        self._delay = round_ratio(DELAY_BITS * SECOND, self._form.baud) if bits & DELAYED else 0
-        slow = bool(bits & DELAYED)
-        if slow != self._slow:
-            self._slow = slow
-            more = MORE_STOP_BITS if slow else 0
-            self._transmitter.change(self._form._replace(stop_bits=self._form.stop_bits + more))
+        """V: bit 1 chooses later and slower answers, from that to the next character on."""
+        self._slow_next = bool(bits & DELAYED)
 
     def answer(self, text: str, now: Ns) -> None:
         """Answer the command that was recognised at `now`."""
@@ -51,6 +46,11 @@ class Prompter:
         """A new character comes: drop what has not begun."""
         self._pending, self._due = b"", NEVER
         self._transmitter.discard()
+        if self._slow != self._slow_next:
+            self._slow = self._slow_next
+            self._delay = round_ratio(DELAY_BITS * SECOND, self._form.baud) if self._slow else 0
+            more = MORE_STOP_BITS if self._slow else 0
+            self._transmitter.change(self._form._replace(stop_bits=self._form.stop_bits + more))
 
     def advance(self, now: Ns) -> None:
         """Begin what is due."""
