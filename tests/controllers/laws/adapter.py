@@ -51,6 +51,22 @@ class Limit(NamedTuple):
     gate: bool = False
 
 
+class Redefinition(NamedTuple):
+    """A way to give a position another number, and the page that has it.
+
+    `neutral` does the same but for that (= stops like Z; a command that takes the time of O). `applies`: whether it is
+    obeyed now.
+    """
+
+    name: str
+    page: str
+    deeds: Sequence[Deed]
+    neutral: Sequence[Deed]
+    value: int
+    axes: Sequence[str]
+    applies: Callable[[Bench], bool] = lambda bench: True
+
+
 class Model(Protocol):
     """The adapter of one model. See CONTRIBUTING, "The laws"."""
 
@@ -90,6 +106,21 @@ class Model(Protocol):
 
     def limits(self) -> Sequence[Limit]:
         """Its limits."""
+
+    modulus: int
+    """The positions that its counter can tell apart."""
+
+    def redefinition(self, draw: Random) -> Redefinition | None:
+        """A way in which it redefines a position; None if it has none."""
+
+    def redefines(self, bench: Bench) -> bool:
+        """Whether the last deed, or what it set off, may give the position another number."""
+
+    def onward(self, draw: Random) -> Sequence[Deed]:
+        """What does not depend on the number that a position has: relative moves, slews, stops, keys."""
+
+    def told(self, bench: Bench, axis: str) -> int | None:
+        """The position as it tells its host now, asked over the line; None if it cannot be asked now."""
 
 
 def ready(model: Model, history: History) -> Bench:

@@ -5,7 +5,7 @@ from math import sqrt
 from random import Random
 from typing import Any
 
-from tests.controllers.laws.adapter import Limit, Stop
+from tests.controllers.laws.adapter import Limit, Redefinition, Stop
 from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
 
 from detent.controllers.dcb274.firmware import Dcb274
@@ -106,6 +106,8 @@ class Axis:
 
     phases = ("rest", "a program at rest", "pre-energizing", "speeding up", "at speed", "slowing", "turning", "homing",
               "back home", "jogging", "pending", "a program moving")  # fmt: skip
+
+    modulus = 1 << 24
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -227,6 +229,43 @@ class Axis:
                 return phase not in ("rest", "a program at rest", "a program moving", "pending", "turning", "jogging")
         return phase != "jogging"
 
+    def redefinition(self, draw: Random) -> Redefinition:
+        value = draw.choice((0, 1, 5, 100, -77, 4096, 8_388_607, -8_388_607))
+        return Redefinition("O", "47", [Say(f"O {value}"), Wait(1 * MS)], [Say("b 30"), Wait(1 * MS)], value, ("",),
+                            lambda bench: listens(bench) and not busy(bench) and not absolute(bench)
+                            and not bench.device._motion.jogging)  # type: ignore[attr-defined]  # fmt: skip
+
+    def redefines(self, bench: Bench) -> bool:
+        typed = [deed for deed in bench.deeds[-12:] if isinstance(deed, Say | Raw | Power)]  # O takes its time
+        programs = any(isinstance(deed, Say) and deed.text == "O 0" for deed in bench.deeds)
+        return (
+            any(
+                isinstance(deed, Power)
+                or (isinstance(deed, Raw) and 3 in deed.data)
+                or (isinstance(deed, Say) and deed.text.startswith("O "))
+                for deed in typed
+            )
+            or programs
+        )
+
+    def onward(self, draw: Random) -> Sequence[Deed]:
+        match draw.randrange(6):
+            case 0 | 1 | 2:
+                return [Say(draw.choice(("+ 400", "- 90", "+ 3", "M 900", "M -5000", "M 0", "F 900 0", "H 1", "H 3")))]
+            case 3:
+                return [draw.choice((Say("@"), Raw(b"\x1b")))]
+            case 4:
+                pin = draw.choice((*KEYS[:3], *SWITCHES, "SS", "HOME"))
+                return [Put(pin, LOW), Wait(80 * MS), Put(pin, HIGH)]
+        return [Say(draw.choice(("^", "A129", "] 0", "A 8", "E 1")))]
+
+    def told(self, bench: Bench, axis: str) -> int | None:
+        if not listens(bench) or busy(bench) or bench.device._motion.jogging:  # type: ignore[attr-defined]
+            return None
+        place = len(bench.out)
+        bench.play((Say("Z"), Wait(500 * US)))
+        return int(bench.heard(place).strip("\r\n").split("Z")[1])
+
     def limits(self) -> Sequence[Limit]:
         def steps(bench: Bench, rate: float) -> int:
             _, down, initial, _, divide = registers(bench)
@@ -236,6 +275,11 @@ class Axis:
             Limit("LIMIT-A", "", 1, lambda bench: bench.level("LIMIT-A") == LOW, steps),
             Limit("LIMIT-B", "", -1, lambda bench: bench.level("LIMIT-B") == LOW, steps),
         )
+
+
+def absolute(bench: Bench) -> bool:
+    """Whether something depends on the number of a position: a trip, the readout of Z 1."""
+    return any(isinstance(deed, Say) and deed.text[:2] in ("T ", "k ", "i ", "Z ", "G ", "C ") for deed in bench.deeds)
 
 
 def named(bench: Bench) -> bool:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from random import Random
 from typing import Any
 
-from tests.controllers.laws.adapter import Limit, Stop
+from tests.controllers.laws.adapter import Limit, Redefinition, Stop
 from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
 
 from detent.controllers.genstepper.firmware import GenStepper
@@ -56,6 +56,7 @@ class Board:
     """A board; `hard`: limits stop at once, by order (page 12)."""
 
     phases = REPORTS
+    modulus = 1 << 40  # it saturates, far away
 
     def __init__(self, name: str, *, hard: bool) -> None:
         self.name, self._hard = name, hard
@@ -139,6 +140,38 @@ class Board:
     def meets(self, phase: str, stop: Stop) -> bool:
         return not (phase == "idle" and stop.name == "limit")
 
+    def redefinition(self, draw: Random) -> Redefinition:
+        value = draw.choice((0, 1, 5, 100, -77, 4096, -100_001))
+        who, axes = draw.choice((("X", ("X",)), ("Y", ("Y",)), ("B", ("X", "Y"))))
+        return Redefinition("=", "38", [Say(f"{who}{value}=")], [Say(f"{who}{value}Z")], value, axes, hears)
+
+    def redefines(self, bench: Bench) -> bool:
+        last = bench.deeds[-1]
+        if isinstance(last, Say):
+            return "=" in last.text or "!" in last.text
+        return isinstance(last, Power) or (isinstance(last, Raw) and bool(set(last.data) & set(b"=!")))
+
+    def onward(self, draw: Random) -> Sequence[Deed]:
+        match draw.randrange(8):
+            case 0 | 1 | 2:
+                return [Say(f"{draw.choice('XYB')}{draw.choice((300, -900, 5, 4000))}S")]
+            case 3 | 4:
+                return [Say(draw.choice(("B+S", "X-S", "Y+S", "BZ", "B3O", "B1O", "B1W", "B8000R", "900R")))]
+            case 5:
+                return [Put(draw.choice(KEYS), draw.choice((LOW, HIGH, HIGH)))]
+            case 6:
+                pin = draw.choice(LIMITS)
+                return [Put(pin, LOW), Wait(5 * MS), Put(pin, HIGH)]
+        return self.meanwhile(draw)
+
+    def told(self, bench: Bench, axis: str) -> int | None:
+        if not hears(bench):
+            return None
+        place = len(bench.out)
+        bench.play((Say(f"{axis}-1?"), Wait(2 * MS)))
+        heard = bench.heard(place).strip("\r\n*")
+        return int(heard.split(",")[2])
+
     def limits(self) -> Sequence[Limit]:
         return [self._limit(pin) for pin in LIMITS]
 
@@ -149,6 +182,11 @@ class Board:
             return 0 if self._hard else ramp_steps(rate, *ramp(bench, axis))
 
         return Limit(pin, axis, direction, lambda bench: bench.level(pin) == LOW, steps)
+
+
+def hears(bench: Bench) -> bool:
+    """Whether it takes commands: on, and not deaf behind a reset."""
+    return bench.device.status(bench.now).state in ("ready", "running")
 
 
 MODELS = (Board("bs0610", hard=False), Board("bs0710", hard=True))

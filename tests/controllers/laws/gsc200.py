@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from random import Random
 from typing import Any
 
-from tests.controllers.laws.adapter import Limit, Stop
+from tests.controllers.laws.adapter import Limit, Redefinition, Stop
 from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
 
 from detent.controllers.gsc200.firmware import GsC200
@@ -170,6 +170,40 @@ class Module:
                 return phase in ("speeding up", "at speed", "slowing")
         return True
 
+    @property
+    def modulus(self) -> int:
+        return 10_000_000 if self.name == "gs-c200" else 1 << 24
+
+    def redefinition(self, draw: Random) -> Redefinition:
+        if self.name == "gs-c200" or draw.random() < 0.3:
+            return Redefinition("I1", "Ix", [Say("I1"), Wait(1 * MS)], [Say("I2"), Wait(1 * MS)], 0, ("",), idle)
+        value = draw.choice((0, 1, 5, 100, -77, 4096, 8_388_607, -8_388_608))
+        if draw.random() < 0.5:
+            force, neutral = ([Say("Po"), Say(line), Say("+90"), Say("E"), Wait(SECOND * 30)]
+                              for line in (f"f{value:+d}", "f+0"))  # fmt: skip
+            return Redefinition("f", "fs", force, neutral, value, ("",), idle)
+        return Redefinition("f", "fs", [Say(f"f{value:+d}")], [Say("f+0")], value, ("",), idle)
+
+    def redefines(self, bench: Bench) -> bool:
+        """I1, I3 and f; power; homing, when it is complete."""
+        words = {deed.text for deed in bench.deeds if isinstance(deed, Say)}
+        homes = bool(words & {"H", "H-"}) or self.name == "gs-c200s" or bench.device.straps["REC"] == LOW
+        last = bench.deeds[-1]
+        return homes or isinstance(last, Power) or (isinstance(last, Say) and last.text in ("I1", "I3"))
+
+    def onward(self, draw: Random) -> Sequence[Deed]:
+        moves = ("+1", "+40", "+700", "+9000", "F", "V2", "Z", "K", "S20", "A1", "Y9")
+        own = ("-40", "g+", "g-2", "g+1") if self.name == "gs-c200s" else ()
+        return [Say(draw.choice(moves + own))] if draw.random() < 0.8 else [Put("UI2", LOW), Wait(1), Put("UI2", HIGH)]
+
+    def told(self, bench: Bench, axis: str) -> int | None:
+        if bench.device.status(bench.now).state == "off":
+            return None
+        place = len(bench.out)
+        bench.play((Say("V1"), Wait(1 * MS)))
+        heard = bench.heard(place).strip("\r\n")
+        return int(heard[1:]) if heard.startswith("V") else None
+
     def limits(self) -> Sequence[Limit]:
         def low(pin: str, *, met: str) -> Limit:
             def steps(bench: Bench, rate: float) -> int:
@@ -187,6 +221,11 @@ class Module:
             low("HOME", met="seek home"),
             *(user(f"UI{n}") for n in (1, 2, 3)),
         )
+
+
+def idle(bench: Bench) -> bool:
+    """Whether it is ready for a command."""
+    return bench.device.status(bench.now).state == "ready"
 
 
 def waited(bench: Bench) -> str:

@@ -19,16 +19,19 @@ GAPS: Sequence[Ns] = (0, 0, 0, 1, 1 * MS, 2 * MS, 12 * MS, 40 * MS, 90 * MS, 150
 
 
 class History(NamedTuple):
-    """How a device is built, what sits on its axes, and what happens to it."""
+    """How a device is built, what sits on its axes, what happens to it before and behind what a law speaks of."""
 
     options: Mapping[str, Any]
     contacts: tuple[Contact, ...]
     deeds: tuple[Deed, ...]
+    later: tuple[Deed, ...] = ()
 
     def smaller(self) -> "Iterator[History]":
         """The same with one thing less, or one wait shorter."""
         for n in reversed(range(len(self.deeds))):
             yield self._replace(deeds=self.deeds[:n] + self.deeds[n + 1 :])
+        for n in reversed(range(len(self.later))):
+            yield self._replace(later=self.later[:n] + self.later[n + 1 :])
         for n in range(len(self.contacts)):
             yield self._replace(contacts=self.contacts[:n] + self.contacts[n + 1 :])
         for name in self.options:
@@ -68,7 +71,8 @@ def shown(history: History) -> str:
     """A history as a person reads it, a deed a line."""
     lines = [f"  {name} = {value!r}" for name, value in history.options.items()]
     lines += [f"  {contact}" for contact in history.contacts]
-    return "\n".join(lines + [f"  {deed}" for deed in history.deeds])
+    later = [f"  {deed}" for deed in history.later]
+    return "\n".join(lines + [f"  {deed}" for deed in history.deeds] + ["later", *later] * bool(later))
 
 
 def _smallest(

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from random import Random
 from typing import Any
 
-from tests.controllers.laws.adapter import Limit, Stop
+from tests.controllers.laws.adapter import Limit, Redefinition, Stop
 from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
 
 from detent.controllers.supersigma.firmware import Supersigma
@@ -118,6 +118,21 @@ class Drive:
 
     def meets(self, phase: str, stop: Stop) -> bool:
         return not (stop.name == "RAIL" and phase in ("to the switch", "from the switch"))
+
+    modulus = 1 << 40
+
+    def redefinition(self, draw: Random) -> Redefinition | None:
+        return None  # "it is impossible to know the position": origination is its one way
+
+    def redefines(self, bench: Bench) -> bool:
+        """Power, and the origin, when it is found."""
+        return isinstance(bench.deeds[-1], Power) or Say("originate") in bench.deeds
+
+    def onward(self, draw: Random) -> Sequence[Deed]:
+        return ()
+
+    def told(self, bench: Bench, axis: str) -> int | None:
+        return None
 
     def limits(self) -> Sequence[Limit]:
         def steps(bench: Bench, rate: float) -> int:

@@ -1,11 +1,10 @@
 """A stop leads to rest: in the time that its ramp can take, and nothing that was pending before it moves afterwards."""
 
-from collections.abc import Sequence
 from random import Random
 
 import pytest
 from tests.controllers.laws.adapter import Model, Stop, history, ready
-from tests.controllers.laws.bench import Bench, Deed
+from tests.controllers.laws.bench import Bench
 from tests.controllers.laws.histories import ORDINARY, THOROUGH, History, hold
 from tests.controllers.laws.models import MODELS, every_model
 
@@ -15,13 +14,13 @@ Met = set[tuple[str, str]]
 """Phases in which stops have come."""
 
 
-def a_stop_leads_to_rest(model: Model, past: History, stop: Stop, meanwhile: Sequence[Deed], met: Met) -> bool:
+def a_stop_leads_to_rest(model: Model, past: History, stop: Stop, met: Met) -> bool:
     bench = before(model, past, stop)
     if not stop.applies(bench):
         return False
     begun, allowed, axes = bench.now, stop.allowed(bench), stop.axes(bench)
     phases = {(model.phase(bench, axis), stop.name) for axis in axes}
-    bench.play((*stop.deeds(bench), *meanwhile))
+    bench.play((*stop.deeds(bench), *past.later))
     bench.go_to(max(begun + allowed, bench.now))
     for axis in axes:
         assert not bench.travels[axis].moving, f"{stop.name} at {begun} ns: {axis or 'it'} moves {allowed} ns later"
@@ -45,11 +44,11 @@ def before(model: Model, past: History, stop: Stop) -> Bench:
 def check(model: Model, count: int) -> Met:
     stops, met = {stop.name: stop for stop in model.stops()}, Met()
 
-    def make(draw: Random) -> tuple[History, tuple[str, Sequence[Deed]]]:
-        return history(model, draw), (draw.choice(list(stops)), model.meanwhile(draw))
+    def make(draw: Random) -> tuple[History, str]:
+        return history(model, draw)._replace(later=tuple(model.meanwhile(draw))), draw.choice(list(stops))
 
-    def law(past: History, then: tuple[str, Sequence[Deed]]) -> bool:
-        return a_stop_leads_to_rest(model, past, stops[then[0]], then[1], met)
+    def law(past: History, name: str) -> bool:
+        return a_stop_leads_to_rest(model, past, stops[name], met)
 
     assert hold(law, make, count, f"stops of {model.name}") > count // 2
     return met
