@@ -121,16 +121,20 @@ class Runs:
             upto = min(upto, self._last)
         taken = []
         while self.next <= upto:
-            run = self._rest or self._find()
-            wanted = upto - self.next + 1
-            if run.steps <= wanted:
-                self._rest = None
-            else:
-                run, self._rest = run.split(wanted)
-            taken.append(run)
-            self.next += run.steps
-            self.base = run.last
+            taken.append(self.one(upto))
         return taken
+
+    def one(self, upto: int) -> Run:
+        """The next run, which ends at `upto` at the latest; `next` <= `upto`, and there is such a pulse."""
+        run = self._rest or self._find()
+        wanted = upto - self.next + 1
+        if run.steps <= wanted:
+            self._rest = None
+        else:
+            run, self._rest = run.split(wanted)
+        self.next += run.steps
+        self.base = run.last
+        return run
 
     def due(self) -> int | None:
         """The tick nearest to the time of pulse `next`, which may be off by the error; None if there is none."""

@@ -32,8 +32,7 @@ class Stopped(NamedTuple):
 
     `at` is the cell time of the stop (its tick, less lead and lag): no pulse came behind it, and all before it came.
     `edge` is that of the first sample which showed the level. `shaft` is the firmware's count as a shaft position.
-    `present` is the level of the input when it was asked for afterwards: a glitch may be over. `others` are the
-    further steppers that the same stop has stopped, with their positions.
+    `present` is the level of the input when it was asked for afterwards: a glitch may be over.
     """
 
     board: str

@@ -1,34 +1,157 @@
 """Digital outputs: levels at exact ticks, held on the host until shortly before they are due, with a watchdog."""
 
+from collections import deque
+from typing import NamedTuple
+
+from detent.realtime.boards.core import MASK, UNSURE, Core
+from detent.realtime.boards.dictionary import Value
+from detent.realtime.boards.setup import OutSetup
+from detent.realtime.pace import WallNs
 from detent.ticks import MS, Ns
 
 HOLD: Ns = 8 * MS
-"""A change is given to the board so long before it is due: until then it can be taken back."""
+"""A change is given to the board so long before it is due (or two margins): until then it can be taken back."""
+
+
+class _Change(NamedTuple):
+    at: Ns  # cell time
+    tick: int
+    level: bool
 
 
 class DigitalOut:
-    """An output of a board; found as `board.outs[name]`. Levels are logical."""
+    """An output of a board; found as `board.outs[name]`. Levels are logical.
 
-    name: str
-    level: bool
-    """The last level that was given to the board."""
-    corrections: int
-    """How often a change that had left was corrected, because the cell was taken back to before it."""
+    `level` is the last one that was given to the board. `corrections` counts the changes that had left when the cell
+    was taken back to before them, and were corrected.
+    """
+
+    def __init__(self, core: Core, setup: OutSetup, oid: int) -> None:
+        self.name, self.setup, self.oid = setup.name, setup, oid
+        self.level = setup.initial
+        self.corrections = 0
+        self._core = core
+        self._pending: deque[_Change] = deque()
+        self._given: deque[_Change] = deque(maxlen=256)
+        self._last_tick = -(1 << 62)  # of what was given
+        self._first = setup.initial  # before all that was given
+        self._back: bool | None = None  # taken back: the level that it had there
+        self._fed_at: WallNs | None = None
+        self.dead = True  # shut down, or not configured: nothing is sent
+
+    def config(self) -> tuple[str, dict[str, Value | str]]:
+        """The command that makes it; pins by name."""
+        setup = self.setup
+        low = setup.pin.active_low
+        return "config_digital_out", {
+            "oid": self.oid, "pin": setup.pin.name, "value": int(setup.initial is not low),
+            "default_value": int(setup.off is not low),
+            "max_duration": 0 if setup.watchdog is None else self._core.ticks(setup.watchdog),
+        }  # fmt: skip
 
     def set(self, level: bool, at: Ns, lag: Ns = 0) -> None:
         """From cell time `at` on the output has `level`; it changes at `at` + lead + `lag` (of the unit's axis).
 
-        Times do not fall. Several changes at one instant come a tick apart each. What is due already is done at once.
+        Times do not fall, but for a `rewind`. Several changes at one instant come a tick apart each. What is due
+        already is done at once.
         """
-        raise NotImplementedError
+        self._pending.append(_Change(at, self._core.scale.tick(at + lag), level))
 
     def rewind(self, at: Ns) -> None:
         """The cell is taken back to `at`: changes behind it are forgotten; what is set next is the truth.
 
-        Where they had been given to the board and are not set again alike, they are corrected as soon as may be.
+        Where they had been given to the board and are not set again alike, they are corrected with the next commit.
         """
-        raise NotImplementedError
+        while self._pending and self._pending[-1].at > at:
+            self._pending.pop()
+        while self._given and self._given[-1].at > at:
+            self._given.pop()
+        self._back = self._given[-1].level if self._given else self._first
 
     def now(self, level: bool) -> None:
         """Take `level` as soon as may be, behind what was given to the board before; what was not is forgotten."""
-        raise NotImplementedError
+        self._pending.clear()
+        self._back = level
+
+    # -- what leaves
+
+    def commit(self, wall: WallNs) -> None:
+        """Give the board what is due soon, and the watchdog its food."""
+        if self.dead:
+            return
+        core = self._core
+        soonest = core.soonest(wall)
+        if self._back is not None:
+            self._correct(self._back, soonest, wall)
+        horizon = soonest + core.ticks(max(HOLD - core.setup.margin, core.setup.margin))
+        while self._pending and self._pending[0].tick <= horizon:
+            change = self._pending.popleft()
+            if not self._give(change.tick, change.level, soonest, wall):
+                self._pending.appendleft(change)
+                return
+            self._given.append(change)
+        if self._hungry(wall):
+            self._give(soonest, self.level, soonest, wall)
+
+    def _correct(self, level: bool, soonest: int, wall: WallNs) -> None:
+        """Behind a rewind: what is set for ticks that are given away already cannot come then."""
+        at: Ns = 0
+        while self._pending and self._pending[0].tick <= self._last_tick:
+            at, _, level = self._pending.popleft()
+            self._given.append(_Change(at, self._last_tick, level))
+        if level is not self.level:
+            if not self._give(soonest, level, soonest, wall):
+                self._back = level
+                return
+            self.corrections += 1
+        self._back = None
+
+    def _give(self, tick: int, level: bool, soonest: int, wall: WallNs) -> bool:
+        core = self._core
+        if core.queue.room(core.clock.tick_at(wall) - core.ticks(UNSURE)) <= 0:
+            return False
+        tick = max(tick, soonest, self._last_tick + 1)
+        core.command("queue_digital_out", oid=self.oid, clock=tick & MASK,
+                     on_ticks=int(level is not self.setup.pin.active_low))  # fmt: skip
+        core.queue.take(self.oid, tick)
+        self._last_tick, self.level, self._fed_at = tick, level, wall
+        return True
+
+    def _hungry(self, wall: WallNs) -> bool:
+        at = self.deadline()
+        return at is not None and wall >= at
+
+    def deadline(self) -> WallNs | None:
+        """When the watchdog wants to be fed."""
+        if self.dead:
+            return None
+        if self.setup.watchdog is None or self.level is self.setup.off:
+            return None
+        return (self._fed_at or 0) + self.setup.watchdog // 4
+
+    def pending_at(self) -> WallNs | None:
+        """When the next change has to be given to the board."""
+        if self.dead or not (self._pending or self._back is not None):
+            return None
+        core = self._core
+        if self._back is not None:
+            return 0
+        return core.clock.wall_at(self._pending[0].tick) - max(HOLD, 2 * core.setup.margin)
+
+    # -- what the firmware does
+
+    def began(self, wall: WallNs, level: bool | None = None) -> None:
+        """The board is configured, or ready again, with the output at `level` (None: as it is set up)."""
+        self.level = self._first = self.setup.initial if level is None else level
+        self._pending.clear()
+        self._given.clear()
+        self._back = None
+        self._last_tick = -(1 << 62)
+        self._fed_at = wall - (self.setup.watchdog or 0)
+        self.dead = False
+
+    def shut_down(self) -> None:
+        """It has fallen to `off`."""
+        self.dead = True
+        self._pending.clear()
+        self.level = self.setup.off

@@ -1,55 +1,147 @@
 """Where bytes of a board come from: a serial device, or a fake board in this process."""
 
+import os
+import termios
+import tty
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from pathlib import Path
+from typing import NamedTuple
 
+from detent.realtime.boards.board import Board, State
+from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.port import FakePort
+from detent.realtime.boards.port import Port as Port
+from detent.realtime.boards.port import PortError as PortError
+from detent.realtime.boards.port import PortLost as PortLost
+from detent.realtime.boards.setup import BoardSetup
 from detent.realtime.pace import WallNs
 
-
-class PortError(OSError):
-    """A port that cannot be opened; the text says why and what to do."""
-
-
-class PortLost(OSError):
-    """A port that went away."""
+BAUD = 250_000  # the firmware's own default; USB boards do not care
+MOST_READ = 4096
+FAKE = "fake:"
+BY_ID = Path("/dev/serial/by-id")
 
 
-class Port(Protocol):
-    """Bytes to and from a board. No call ever waits."""
+class SerialPort:
+    """A serial device, a USB board, or the terminal of the firmware's Linux process."""
 
-    address: str
+    def __init__(self, address: str) -> None:
+        """`address` is a device, with `@BAUD` behind it where it is no USB board and not flashed for 250000 Bd.
+
+        PortError with the remedy.
+        """
+        self.address = address
+        device, at, baud = address.rpartition("@")
+        self._device, self._baud = (device, baud) if at and baud.isdigit() else (address, str(BAUD))
+        self._port: object | None = None
+        self._descriptor = -1
+        self._waiting = bytearray()
+        self._open()
+
+    def _open(self) -> None:
+        device = self._device
+        try:
+            self._descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError as error:
+            remedy = "join the group of the device (dialout)" if isinstance(error, PermissionError) else (
+                "look at /dev/serial/by-id and plug it in")  # fmt: skip
+            raise PortError(f"{device} cannot be opened: {error.strerror}; {remedy}") from error
+        try:
+            tty.setraw(self._descriptor)
+            if not os.path.realpath(device).startswith("/dev/pts/"):
+                self._set_baud()
+        except (OSError, termios.error, ValueError) as error:
+            self.close()
+            raise PortError(f"{device} is no serial device: {error}; name the board's own, as in {BY_ID}") from error
+
+    def _set_baud(self) -> None:
+        import serialx
+
+        os.close(self._descriptor)
+        port = serialx.Serial(self._device, int(self._baud))  # type: ignore[abstract]  # this system's own class
+        port.open()
+        self._port, self._descriptor = port, port.fileno()
+        os.set_blocking(self._descriptor, False)
 
     def reading(self) -> Sequence[int]:
-        """File descriptors to watch for something to read."""
+        """The device, while it is there."""
+        return (self._descriptor,) if self._descriptor >= 0 else ()
 
     def writing(self) -> Sequence[int]:
-        """File descriptors to watch for room to write."""
+        """The device, while bytes wait."""
+        return (self._descriptor,) if self._descriptor >= 0 and self._waiting else ()
 
     def receive(self, wall: WallNs) -> bytes:
-        """What has come; nothing where nothing has. PortLost."""
+        """What has come. PortLost."""
+        if self._descriptor < 0:
+            return b""
+        try:
+            data = os.read(self._descriptor, MOST_READ)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise self._lost(error.strerror) from error
+        if not data and not Path(self._device).exists():
+            raise self._lost("it was unplugged")
+        return data
 
     def send(self, data: bytes, wall: WallNs) -> None:
         """Send `data`, now or when there is room. PortLost."""
+        self._waiting += data
+        self.flush()
 
     def flush(self) -> None:
         """There is room to write again. PortLost."""
+        if self._descriptor < 0:
+            return
+        try:
+            while self._waiting:
+                del self._waiting[: os.write(self._descriptor, self._waiting)]
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            raise self._lost(error.strerror) from error
 
     def deadline(self) -> WallNs | None:
-        """When `receive` wants to be called though no descriptor says so: only of a board in this process."""
+        """Never: its descriptor says when."""
+        return None
 
     def reopen(self) -> bool:
-        """After PortLost: try to open it again; whether it is open."""
+        """Try to open it again; whether it is open."""
+        self.close()
+        try:
+            self._open()
+        except PortError:
+            return False
+        return True
 
     def close(self) -> None:
         """Let go of it."""
+        self._waiting.clear()
+        port, self._port = self._port, None
+        descriptor, self._descriptor = self._descriptor, -1
+        if port is not None:
+            port.close()  # type: ignore[attr-defined]
+        elif descriptor >= 0:
+            os.close(descriptor)
+
+    def _lost(self, reason: str | None) -> PortLost:
+        self.close()
+        return PortLost(f"{self._device} is gone ({reason})")
 
 
 def open_port(address: str) -> Port:
-    """The port at `address`: a serial device (a by-id name is best), a pseudo-terminal, or `fake:` with options.
+    """The port at `address`: a serial device (a by-id name is best), a pseudo-terminal, or `fake:`.
 
-    PortError with the remedy.
+    A fake board has 64 pins, gpio0 and gpio1 taken, and nothing connected. PortError with the remedy.
     """
-    raise NotImplementedError
+    if address.startswith(FAKE):
+        if address != FAKE:
+            raise PortError(f"{address}: a fake board has no settings; write {FAKE}")
+        board = FakeBoard(moves=512)
+        board.kept_log = False
+        return FakePort(board)
+    return SerialPort(address)
 
 
 class Found(NamedTuple):
@@ -65,6 +157,48 @@ class Found(NamedTuple):
     missing: tuple[str, ...]  # commands that Detent needs and that this firmware has not
 
 
+class Look:
+    """A board that is asked what it is, and left as it was: told bytes and the time like `Board`."""
+
+    def __init__(self, port: Port) -> None:
+        self.port = port
+        self._board = Board(BoardSetup("look"), only_look=True)
+
+    def start(self, wall: WallNs) -> None:
+        """Begin to ask."""
+        self._board.start(wall)
+        self._pump(wall)
+
+    def turn(self, wall: WallNs) -> bool:
+        """Read, write, and do what is due; whether it is over. PortLost."""
+        data = self.port.receive(wall)
+        if data:
+            self._board.receive(data, wall)
+        self._board.due(wall)
+        self._pump(wall)
+        return self._board.state in (State.SEEN, State.REFUSED, State.LOST)
+
+    def deadline(self) -> WallNs | None:
+        """When `turn` wants to be called."""
+        times = [at for at in (self._board.deadline(), self.port.deadline()) if at is not None]
+        return min(times, default=None)
+
+    def _pump(self, wall: WallNs) -> None:
+        data = self._board.take()
+        if data:
+            self.port.send(data, wall)
+
+    @property
+    def found(self) -> Found | None:
+        """What it said; None if it is no board with such firmware, or has not said all."""
+        board = self._board
+        if board.state is not State.SEEN:
+            return None
+        words = board.core.dictionary
+        return Found(self.port.address, words.version, words.mcu, words.frequency, board.left_with, words.pins,
+                     words.reserved, tuple(words.missing(board.everything)))  # fmt: skip
+
+
 def candidates() -> list[str]:
     """Serial devices of this computer that may be boards, by their by-id names."""
-    raise NotImplementedError
+    return sorted(str(path) for path in BY_ID.iterdir()) if BY_ID.is_dir() else []

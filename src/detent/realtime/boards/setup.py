@@ -4,7 +4,7 @@ Pins are written as users of 3D printers write them: `!` active low, `^` pull-up
 """
 
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, Self
+from typing import Literal, NamedTuple, Self, TypeAlias
 
 from detent.outputs.steps import Error
 from detent.ticks import MS, SECOND, US, Ns
@@ -57,7 +57,8 @@ class StepperSetup:
 
     A pulse is `pulse` long at least, active as `step` says. `dir` is high in direction +1, low in -1, or the other
     way round if it is active low. With `minus` the pulses of direction -1 come there, those of +1 on `step`, and
-    `dir` is a spare pin: the firmware cannot do without one.
+    `dir` is a spare pin: the firmware cannot do without one. `stops` are the inputs that may stop it (None: every input
+    of the board): each takes an object of the firmware.
     """
 
     name: str
@@ -65,6 +66,7 @@ class StepperSetup:
     dir: Pin
     pulse: Ns = 5 * US
     minus: Pin | None = None
+    stops: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +141,10 @@ class BoardSetup:
     inputs: tuple[InputSetup, ...] = ()
     drivers: tuple[DriverSetup, ...] = field(default=())
 
+    def items(self) -> "list[Item]":
+        """Everything on it that has a name and pins."""
+        return [*self.steppers, *self.outs, *self.inputs, *self.drivers]
+
     def check(self) -> None:
         """Raise SetupProblem for what is wrong on any board: names and pins used twice, values out of range."""
         names: set[str] = set()
@@ -148,9 +154,7 @@ class BoardSetup:
                                f"{self.margin / MS:g} ms: take three margins or more")  # fmt: skip
         if self.lead > SECOND // 2:
             raise SetupProblem(self.name, "lead", f"a lead of {self.lead / MS:g} ms: take 500 ms at most")
-        items: list[StepperSetup | OutSetup | InputSetup | DriverSetup]
-        items = [*self.steppers, *self.outs, *self.inputs, *self.drivers]
-        for item in items:
+        for item in self.items():
             if item.name in names:
                 raise SetupProblem(item.name, "", f"there are two things of that name on the board {self.name}")
             names.add(item.name)
@@ -163,12 +167,21 @@ class BoardSetup:
             if out.watchdog is not None and out.watchdog < max(200 * MS, 4 * self.lead):
                 raise SetupProblem(out.name, "watchdog", f"{out.watchdog / MS:g} ms is less than a busy computer "
                                    f"needs; take {max(200 * MS, 4 * self.lead) / MS:g} ms or more")  # fmt: skip
+        inputs = {entry.name for entry in self.inputs}
+        for stepper in self.steppers:
+            for name in stepper.stops or ():
+                if name not in inputs:
+                    raise SetupProblem(stepper.name, "stops", f"{name} is no input of the board {self.name}: an input "
+                                       "stops only what is on its own board")  # fmt: skip
         for entry in self.inputs:
             if not 1 <= entry.samples <= 255 or not 10 * US <= entry.sample <= 10 * MS:
                 raise SetupProblem(entry.name, "sample", "an input is sampled 1 to 255 times, every 10 us to 10 ms")
 
 
-def _pins(item: StepperSetup | OutSetup | InputSetup | DriverSetup) -> list[tuple[str, Pin]]:
+Item: TypeAlias = StepperSetup | OutSetup | InputSetup | DriverSetup
+
+
+def _pins(item: Item) -> list[tuple[str, Pin]]:
     keys = ("step", "dir", "minus", "pin", "uart", "transmit", "select", "clock", "mosi", "miso")
     return [(key, pin) for key in keys if isinstance(pin := getattr(item, key, None), Pin)]
 

@@ -1,97 +1,271 @@
 """All boards of a cell: one is master of time, all are served together.
 
 The first board is the master. Cell time is its time: a nominal second is so many of its own ticks, so that trains need
-no scaling. Other boards get their ticks by regression of their clocks on the wall clock and of that on the master.
+no scaling. Other boards get their ticks by regression: of their clocks on the wall clock, and of that on the master.
+Their line is drawn anew every second, from the tick at which it stands, to meet the estimate two seconds later: no
+pulse jumps.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from detent.realtime.boards.board import Board
+from detent.outputs.steps import Scale
+from detent.realtime.boards.board import Board, State
 from detent.realtime.boards.drivers import Driver
 from detent.realtime.boards.events import Event
 from detent.realtime.boards.outs import DigitalOut
-from detent.realtime.boards.ports import Port
-from detent.realtime.boards.setup import BoardSetup
+from detent.realtime.boards.port import Port, PortLost
+from detent.realtime.boards.setup import BoardSetup, SetupProblem
 from detent.realtime.boards.stepper import Stepper
 from detent.realtime.boards.stops import Stop
 from detent.realtime.pace import WallNs
-from detent.ticks import Ns
+from detent.ticks import MS, SECOND, Ns
+
+COMMIT_EVERY: WallNs = 2 * MS  # while something moves: more often makes more commands, not better pulses
+REOPEN_EVERY: WallNs = 250 * MS
+REDRAW_EVERY: Ns = SECOND
+MEETING: Ns = 2 * SECOND
+FINER = 5  # bits of the fraction of a tick in the slope of another board
 
 
 class Boards:
     """Boards with their ports. No call ever waits; `wall` is the host's monotonic clock, in ns.
 
     The owner watches `reading()` and `writing()`, calls `receive`, `flush`, and `due` at `deadline()`, runs its cell to
-    the present, tells steppers and outputs what it did, and calls `commit`; then it looks at `events()`.
+    the present, tells steppers and outputs what it did, and calls `commit` (at `commit_at()` too); then it looks at
+    `events()`. `steppers`, `outs`, `stops` and `drivers` are those of all boards, by name.
     """
-
-    boards: Mapping[str, Board]
-    steppers: Mapping[str, Stepper]
-    """Of all boards, by name; so are these:"""
-    outs: Mapping[str, DigitalOut]
-    stops: Mapping[str, Stop]
-    drivers: Mapping[str, Driver]
 
     def __init__(self, boards: Sequence[tuple[BoardSetup, Port]]) -> None:
         """The first is the master of time. SetupProblem for what is wrong on any board."""
-        raise NotImplementedError
+        if not boards:
+            raise ValueError("there is no board")
+        self._pairs = [(Board(setup), port) for setup, port in boards]
+        self.boards: dict[str, Board] = {}
+        self.steppers: dict[str, Stepper] = {}
+        self.outs: dict[str, DigitalOut] = {}
+        self.stops: dict[str, Stop] = {}
+        self.drivers: dict[str, Driver] = {}
+        self.home: dict[str, str] = {}
+        """The board of each stepper, output and driver, by name."""
+        for board, _ in self._pairs:
+            setup = board.setup
+            if board.name in self.boards:
+                raise SetupProblem(board.name, "", "there are two boards of that name")
+            if setup.lead != boards[0][0].lead:
+                raise SetupProblem(board.name, "lead", "all boards of a cell have the same lead, as what happens at "
+                                   "the same time has to leave at the same time")  # fmt: skip
+            for item in setup.items():
+                if item.name in self.home:
+                    raise SetupProblem(item.name, "", f"it is on {self.home[item.name]} and on {board.name}")
+                self.home[item.name] = board.name
+            self.boards[board.name] = board
+            self.steppers |= board.steppers
+            self.outs |= board.outs
+            self.stops |= board.stops
+            self.drivers |= board.drivers
+        self.master = self._pairs[0][0]
+        self.lead: Ns = self.master.setup.lead
+        self._aligned: tuple[Ns, Ns] | None = None  # (cell time, board ns)
+        self._redrawn: Ns = 0
+        self._reopen_at: dict[str, WallNs] = {}
+        self._committed: WallNs = 0
 
-    def start(self, wall: WallNs) -> None:
-        """Begin to talk; a `Ready` or `Refusal` comes from each."""
-        raise NotImplementedError
+    # -- time
 
     def ns_at(self, wall: WallNs) -> Ns:
         """The master's time at `wall`, in its own nanoseconds; never less than what was answered before."""
-        raise NotImplementedError
+        return self.master.core.clock.ns_at(wall)
 
     def wall_at(self, board_ns: Ns) -> WallNs:
         """The first wall time at which the master's time is at least `board_ns`, as far as is known now."""
-        raise NotImplementedError
+        return self.master.core.clock.wall_at_ns(board_ns)
 
     def align(self, cell: Ns, board_ns: Ns) -> None:
         """Cell time `cell` is the master's time `board_ns`: with which everything begins. Pins are a lead later."""
-        raise NotImplementedError
+        self._aligned = cell, board_ns
+        self._redrawn = cell
+        frequency = self.master.frequency
+        tick = (board_ns + self.lead) * frequency // SECOND
+        self.master.core.scale = Scale(frequency, SECOND, tick, cell)
+        for board, _ in self._pairs[1:]:
+            self._draw(board, cell, None)
+        for stepper in self.steppers.values():
+            stepper.rescale()
+
+    def cell_at(self, wall: WallNs) -> Ns:
+        """The cell time at `wall`. Only behind `align`."""
+        assert self._aligned is not None
+        return self._aligned[0] + self.ns_at(wall) - self._aligned[1]
+
+    def wall_of(self, cell: Ns) -> WallNs:
+        """The wall time at which the cell is at `cell`, as far as is known now. Only behind `align`."""
+        assert self._aligned is not None
+        return self.wall_at(self._aligned[1] + cell - self._aligned[0])
+
+    def _draw(self, board: Board, now: Ns, tick: int | None) -> None:
+        """The line of cell time to ticks of another board from `now` on, where it is at `tick` (None: anywhere)."""
+        clock = board.core.clock
+        if not clock.known:
+            return
+
+        def at(cell: Ns) -> int:
+            return clock.tick_at(self.wall_of(cell + self.lead))
+
+        begin = at(now) if tick is None else tick
+        slope = (at(now + MEETING) - begin) << FINER
+        numerator = slope * SECOND // MEETING
+        board.core.scale = Scale(numerator, SECOND << FINER, begin, now)
+
+    # -- work
+
+    def start(self, wall: WallNs) -> None:
+        """Begin to talk; a `Ready` or `Refusal` comes from each."""
+        for board, port in self._pairs:
+            board.start(wall)
+            self._pump(board, port, wall)
+
+    @property
+    def ready(self) -> bool:
+        """Whether every board is."""
+        return all(board.state is State.READY for board, _ in self._pairs)
 
     def commit(self, now: Ns, wall: WallNs) -> None:
         """The cell has been run to `now` and everything it did was told: give the boards what is certain, at once."""
-        raise NotImplementedError
+        self._committed = wall
+        if self._aligned is not None and now - self._redrawn >= REDRAW_EVERY:
+            self._redrawn = now
+            for board, _ in self._pairs[1:]:
+                self._draw(board, now, board.core.scale.tick(now))
+                for stepper in board.steppers.values():
+                    stepper.rescale()
+        for board, port in self._pairs:
+            board.commit(now, wall)
+            board.release_suppressed(wall)
+            self._pump(board, port, wall)
+
+    def commit_at(self) -> WallNs | None:
+        """When `commit` is wanted though nothing new was told: pulses become certain, outputs fall due."""
+        if self._aligned is None:
+            return None
+        times = []
+        for board, _ in self._pairs:
+            if board.state is not State.READY:
+                continue
+            for stepper in board.steppers.values():
+                pulse = stepper.next_pulse()
+                if pulse is not None:
+                    times.append(self.wall_of(pulse))
+            times += [at for out in board.outs.values() if (at := out.pending_at()) is not None]
+            if any(driver.waiting for driver in board.drivers.values()) or any(
+                stop.pending for stop in board.stops.values()
+            ):
+                times.append(0)
+        return max(min(times), self._committed + COMMIT_EVERY) if times else None
 
     def events(self) -> list[Event]:
         """What came back since the last call, in order."""
-        raise NotImplementedError
+        found: list[Event] = []
+        for board, _ in self._pairs:
+            found += board.core.events
+            board.core.events.clear()
+        return found
 
     def reading(self) -> Sequence[int]:
         """File descriptors to watch for something to read."""
-        raise NotImplementedError
+        return [descriptor for _, port in self._pairs for descriptor in port.reading()]
 
     def writing(self) -> Sequence[int]:
         """File descriptors to watch for room to write."""
-        raise NotImplementedError
+        return [descriptor for _, port in self._pairs for descriptor in port.writing()]
 
     def receive(self, descriptor: int, wall: WallNs) -> None:
         """`descriptor` has something to read."""
-        raise NotImplementedError
+        for board, port in self._pairs:
+            if descriptor in port.reading():
+                self._read(board, port, wall)
 
-    def flush(self, descriptor: int) -> None:
+    def flush(self, descriptor: int, wall: WallNs) -> None:
         """`descriptor` has room to write."""
-        raise NotImplementedError
+        for board, port in self._pairs:
+            if descriptor in port.writing():
+                try:
+                    port.flush()
+                except PortLost as error:
+                    self._gone(board, str(error), wall)
 
     def deadline(self) -> WallNs | None:
         """When `due` wants to be called, whatever else happens (retransmission, clock, watchdogs, a fake board)."""
-        raise NotImplementedError
+        times = list(self._reopen_at.values())
+        for board, port in self._pairs:
+            times += [at for at in (board.deadline(), port.deadline()) if at is not None]
+        return min(times, default=None)
 
     def due(self, wall: WallNs) -> None:
         """It is `deadline`; may be called at any time."""
-        raise NotImplementedError
+        for board, port in self._pairs:
+            at = port.deadline()
+            if at is not None and wall >= at:
+                self._read(board, port, wall)
+            board.due(wall)
+            self._pump(board, port, wall)
+            again = self._reopen_at.get(board.name)
+            if again is not None and wall >= again:
+                self._reopen(board, port, wall)
 
     def emergency_stop(self, wall: WallNs) -> None:
         """Stop every board at once."""
-        raise NotImplementedError
+        for board, port in self._pairs:
+            board.emergency_stop(wall)
+            self._pump(board, port, wall)
 
     def recover(self, wall: WallNs) -> None:
-        """Make every board ready again that is shut down or lost; each says `Recovered`."""
-        raise NotImplementedError
+        """Make every board ready again that is shut down or lost; each says `Recovered`.
+
+        A port that is gone is tried until it is there.
+        """
+        for board, port in self._pairs:
+            if board.state in (State.LOST, State.REFUSED):
+                self._reopen_at[board.name] = wall
+            else:
+                board.recover(wall)
+            self._pump(board, port, wall)
 
     def close(self) -> None:
         """Let go of the ports. Outputs stay as they are; those with a watchdog fall to `off` when it runs out."""
-        raise NotImplementedError
+        for _, port in self._pairs:
+            port.close()
+
+    def _read(self, board: Board, port: Port, wall: WallNs) -> None:
+        try:
+            data = port.receive(wall)
+        except PortLost as error:
+            self._gone(board, str(error), wall)
+            return
+        if data:
+            board.receive(data, wall)
+            self._pump(board, port, wall)
+
+    def _pump(self, board: Board, port: Port, wall: WallNs) -> None:
+        data = board.take()
+        if not data:
+            return
+        try:
+            port.send(data, wall)
+        except PortLost as error:
+            self._gone(board, str(error), wall)
+
+    def _gone(self, board: Board, reason: str, wall: WallNs) -> None:
+        if board.wants_reopening:
+            self._reopen_at[board.name] = wall
+        board.lose(reason, wall)
+
+    def _reopen(self, board: Board, port: Port, wall: WallNs) -> None:
+        if not port.reopen():
+            self._reopen_at[board.name] = wall + REOPEN_EVERY
+            return
+        del self._reopen_at[board.name]
+        if board.wants_reopening:
+            board.start(wall)
+        else:
+            board.recover(wall)
+        self._pump(board, port, wall)

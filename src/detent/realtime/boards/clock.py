@@ -1,0 +1,91 @@
+"""A board's clock, estimated from round trips: which tick it is at a wall time.
+
+Asked at `sent`, answered at `received`, the board read its clock somewhere between. Slow round trips say little; a
+straight line through the quicker half of the last ones says where the clock stands and how fast it runs. Until two
+seconds have been seen its nominal frequency counts. 32 bits come back; they are extended to the nearest whole count.
+"""
+
+from collections import deque
+from typing import NamedTuple
+
+from detent.realtime.pace import WallNs
+from detent.ticks import SECOND, Ns
+
+KEPT = 32  # round trips
+SEEN: WallNs = 2 * SECOND  # from which on the slope is measured
+WRAP = 1 << 32
+
+
+class _Trip(NamedTuple):
+    middle: WallNs
+    length: WallNs
+    tick: int
+
+
+class Clock:
+    """The estimate for one board. `frequency` is nominal: what the board calls a second."""
+
+    def __init__(self, frequency: int) -> None:
+        self.frequency = frequency
+        self.trips: deque[_Trip] = deque(maxlen=KEPT)
+        self._wall: WallNs = 0  # the line: `_tick` at `_wall`, `_rate` ticks an ns
+        self._tick = 0.0
+        self._whole = 0  # ticks, apart from the fraction: floats keep 2**-20 of a tick so
+        self._rate = frequency / SECOND
+        self._told: Ns = 0
+
+    @property
+    def known(self) -> bool:
+        """Whether any round trip was seen."""
+        return bool(self.trips)
+
+    @property
+    def measured(self) -> float:
+        """Its ticks in a second of the host."""
+        return self._rate * SECOND
+
+    def extend(self, low: int, wall: WallNs) -> int:
+        """The whole count whose low 32 bits are `low` and which is nearest to the estimate at `wall`."""
+        return nearest(low, self.tick_at(wall))
+
+    def note(self, tick: int, sent: WallNs, received: WallNs) -> None:
+        """A round trip; `tick` is a whole count."""
+        self.trips.append(_Trip((sent + received) // 2, received - sent, tick))
+        quick = sorted(self.trips, key=lambda trip: trip.length)[: max(len(self.trips) // 2, 1)]
+        zero = quick[0]
+        self._wall, self._whole = zero.middle, zero.tick
+        n = len(quick)
+        walls = [trip.middle - zero.middle for trip in quick]
+        ticks = [trip.tick - zero.tick for trip in quick]
+        if max(walls) - min(walls) >= SEEN:
+            mean_wall, mean_tick = sum(walls) / n, sum(ticks) / n
+            over = sum((w - mean_wall) ** 2 for w in walls)
+            self._rate = sum((w - mean_wall) * (t - mean_tick) for w, t in zip(walls, ticks, strict=True)) / over
+            self._tick = mean_tick - self._rate * mean_wall
+        else:
+            self._tick = sum(t - self._rate * w for w, t in zip(walls, ticks, strict=True)) / n
+
+    def tick_at(self, wall: WallNs) -> int:
+        """The tick at `wall`, as far as is known now."""
+        return self._whole + int(self._tick + self._rate * (wall - self._wall) // 1)
+
+    def wall_at(self, tick: int) -> WallNs:
+        """The wall time of a tick."""
+        return self._wall + int(((tick - self._whole) - self._tick) / self._rate // 1)
+
+    def ns_at(self, wall: WallNs) -> Ns:
+        """The board's own nanoseconds at `wall`: they never go back, whatever is learnt."""
+        self._told = max(self._told, self.tick_at(wall) * SECOND // self.frequency)
+        return self._told
+
+    def wall_at_ns(self, ns: Ns) -> WallNs:
+        """The first wall time at which `ns_at` is `ns` or more, as far as is known now."""
+        wall = self.wall_at(-(-ns * self.frequency // SECOND))
+        while self.tick_at(wall) * SECOND // self.frequency < ns:
+            wall += 1
+        return wall
+
+
+def nearest(low: int, near: int) -> int:
+    """The number with the low 32 bits of `low` that is nearest to `near`."""
+    return near + ((low - near + (WRAP >> 1)) % WRAP) - (WRAP >> 1)

@@ -1,0 +1,144 @@
+"""What the parts of one board share: its link and dictionary, ticks of cell time, the move queue, questions, events."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from detent.outputs.steps import Scale
+from detent.realtime.boards.clock import Clock, nearest
+from detent.realtime.boards.dictionary import BARE, Dictionary, Message, Value
+from detent.realtime.boards.events import Event
+from detent.realtime.boards.link import Link
+from detent.realtime.boards.setup import BoardSetup
+from detent.realtime.pace import WallNs
+from detent.ticks import MS, SECOND, Ns
+
+MASK = 0xFFFFFFFF
+ASK_AGAIN: WallNs = 40 * MS  # an answer that was lost on the way is asked for again
+UNSURE: Ns = 1 * MS  # how far the clock's estimate may be off, generously
+
+
+class MoveQueue:
+    """The entries of a board's move queue, shared by steppers and outputs, as the host has to count them.
+
+    An entry is free again when it is loaded; `take` says by which tick that is at the latest.
+    """
+
+    def __init__(self) -> None:
+        self.size = 0
+        self._held: dict[int, deque[int]] = {}  # of each oid: the ticks at which its entries are free
+
+    def clear(self, size: int) -> None:
+        """A queue of `size` entries, all free."""
+        self.size = size
+        self._held = {}
+
+    def room(self, tick: int) -> int:
+        """How many entries are certainly free at `tick`."""
+        taken = 0
+        for held in self._held.values():
+            while held and held[0] < tick:
+                held.popleft()
+            taken += len(held)
+        return self.size - taken
+
+    def take(self, oid: int, until: int) -> None:
+        """An entry of `oid` is taken until that tick."""
+        self._held.setdefault(oid, deque()).append(until)
+
+    def forget(self, oid: int) -> None:
+        """The firmware has dropped what `oid` had queued."""
+        self._held.pop(oid, None)
+
+
+@dataclass
+class _Question:
+    message: bytes
+    then: Callable[[Message, WallNs], None]
+    again_at: WallNs
+    left: int  # times that it is asked again
+
+
+class Core:
+    """One board's common ground. Parts send `command`s, `ask` questions and append to `events`."""
+
+    def __init__(self, setup: BoardSetup) -> None:
+        self.setup = setup
+        self.link = Link()
+        self.dictionary: Dictionary = BARE
+        self.clock = Clock(1)
+        self.queue = MoveQueue()
+        self.events: list[Event] = []
+        self.scale = Scale(1)  # cell time to ticks at the pins: the lead is in it
+        self.slips = 0
+        self._questions: dict[tuple[str, int], _Question] = {}
+
+    @property
+    def frequency(self) -> int:
+        """Nominal ticks a second."""
+        return self.clock.frequency
+
+    def ticks(self, ns: Ns) -> int:
+        """A duration in ticks, rounded up."""
+        return -(-ns * self.frequency // SECOND)
+
+    def soonest(self, wall: WallNs) -> int:
+        """The first tick for which something may still be sent at `wall`."""
+        return self.clock.tick_at(wall) + self.ticks(self.setup.margin)
+
+    def whole(self, message: Message, field: str, wall: WallNs) -> int:
+        """A clock in a message, of which 32 bits came, as a whole count."""
+        return nearest(message.number(field), self.clock.tick_at(wall))
+
+    def command(self, name: str, **values: Value) -> None:
+        """Queue a command."""
+        self.link.send(self.dictionary.encode(name, **values))
+
+    def ask(
+        self, name: str, answer: str, then: Callable[[Message, WallNs], None], wall: WallNs, *, times: int = 25,
+        **values: Value,
+    ) -> None:  # fmt: skip
+        """Send the command `name` until the response `answer` (of the same oid, if it has one) has come, then tell it.
+
+        A question that is open already is asked anew, and its answer goes to the new asker.
+        """
+        message = self.dictionary.encode(name, **values)
+        oid = values.get("oid", -1)
+        assert isinstance(oid, int)
+        self._questions[answer, oid] = _Question(message, then, wall + ASK_AGAIN, times)
+        self.link.send(message)
+
+    def asking(self, answer: str, oid: int) -> bool:
+        """Whether that answer is awaited."""
+        return (answer, oid) in self._questions
+
+    def answered(self, message: Message, wall: WallNs) -> bool:
+        """Give a response to who asked; whether somebody had."""
+        oid = message.values.get("oid", -1)
+        assert isinstance(oid, int)
+        question = self._questions.pop((message.name, oid), None)
+        if question is None:
+            return False
+        question.then(message, wall)
+        return True
+
+    def forget_questions(self) -> None:
+        """Nobody wants to know any more."""
+        self._questions.clear()
+
+    def deadline(self) -> WallNs | None:
+        """When a question is to be asked again."""
+        return min((question.again_at for question in self._questions.values()), default=None)
+
+    def due(self, wall: WallNs) -> str | None:
+        """Ask again what has waited long enough; the name of an answer that never came."""
+        for key, question in list(self._questions.items()):
+            if wall < question.again_at:
+                continue
+            if not question.left:
+                del self._questions[key]
+                return key[0]
+            question.left -= 1
+            question.again_at = wall + ASK_AGAIN
+            self.link.send(question.message)
+        return None
