@@ -9,8 +9,8 @@ from detent.realtime.boards.events import Event, Ready
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
-from detent.realtime.boards.several import Boards
 from detent.realtime.boards.setup import BoardSetup, InputSetup, OutSetup, Pin, StepperSetup
+from detent.realtime.boards.several import Boards
 from detent.ticks import MS, SECOND, Ns, to_fixed
 
 E = TypeVar("E")
@@ -124,8 +124,8 @@ class Bench:
 
 
 def bench(
-    *switches: MachineSwitch, board: dict[str, Any] | None = None, port: dict[str, Any] | None = None, start: bool = True,
-    **changes: Any,
+    *switches: MachineSwitch, board: dict[str, Any] | None = None, port: dict[str, Any] | None = None,
+    start: bool = True, **changes: Any,
 ) -> Bench:  # fmt: skip
     """One board with an axis, and a machine behind it."""
     fake = FakeBoard(slide(*switches), **(board or {}))
