@@ -169,7 +169,7 @@ def test_which_unit_is_switched_on_first_changes_no_pulse(case: tuple[Plan, list
 @pytest.mark.parametrize("begins", [{"u0": 0}, {"u0": 300}, {"u1": 300}, {"u0": 300, "u1": 200}])
 @pytest.mark.parametrize("order", [["u0", "u1"], ["u1", "u0"]])
 def test_a_damper_makes_no_step_when_its_controller_is_switched_on(order: list[str], begins: dict[str, int]) -> None:
-    """Page 30, "Electronic damping": it steps behind the last pulse of a motion; before the first there is none."""
+    """Section "Electronic damping": it steps behind the last pulse of a motion; before the first there is none."""
     check_supply(DAMPED, order, begins)
     cell = made(DAMPED, order, begins)
     cell.run_to(SECOND - 1)

@@ -216,3 +216,41 @@ def test_a_module_that_is_switched_off_does_not_answer() -> None:
         unit.moving()
     with pytest.raises(DriverError, match="received nothing"):
         unit.move_by(5)
+
+
+def test_an_error_of_an_old_program_is_told_of_no_move_that_this_driver_makes_or_asks_about() -> None:
+    """Entry F: E5 is "during the program execution"; a program that somebody else has started is none of ours."""
+    made, unit = module("gs-c200")
+    made.type("module", "-100")  # E5 at once
+    for line in ("P", "-100", "E"):
+        made.type("module", line)
+        made.run_to(made.now + 100_000_000)
+    assert not BlockingGsC200(GsC200("gs-c200"), HostPort(made)).moving()
+    for line in ("P", "-100", "E"):
+        made.type("module", line)
+        made.run_to(made.now + 100_000_000)
+    unit.move_by(50)
+    unit.wait(10)
+    assert unit.position() == 50
+    unit.write_program(["-100"])
+    unit.execute()
+    with pytest.raises(MotionFailed, match="E5"):
+        unit.wait(10)
+
+
+@pytest.mark.parametrize("stop", ["halt", "stop"])
+def test_homing_that_is_stopped_below_0_sets_no_move_of_ten_million_steps_off(stop: str) -> None:
+    """Entry K: "it is therefore advisable to always send a Home instruction after a Kill instruction"."""
+    made, unit = module("gs-c200")
+    unit.home(-1)
+    made.run_to(made.now + 300_000_000)
+    getattr(unit, stop)()
+    place = unit.position()
+    assert place > 9_999_000
+    with pytest.raises(Refused, match=rf"counter reads {place}: a move to 0 would make {place} steps away from it"):
+        unit.move_to(0)
+    assert unit.position() == place
+    unit.set_position(0)
+    unit.move_to(30)
+    unit.wait(10)
+    assert unit.position() == 30

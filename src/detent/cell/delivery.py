@@ -1,9 +1,9 @@
 """What reaches whom in one instant: levels over nets, characters over lines, motions to those who follow them.
 
-What the parts did is delivered in rounds, units in the order of their names and then the others, their outputs in the
-order they were made and never merged; what a round causes is delivered in the next. So the order in the file means
-nothing. More than `MOST_DELIVERIES` in one instant is an oscillation, and
-an error that names its pins.
+What the parts did is delivered in rounds: those from which wires lead in the order of their names, so that the order in
+the file changes no pulse; before them the others, in file order. Outputs are delivered in the order they were made, and
+never merged; what a round causes is delivered in the next. More than `MOST_DELIVERIES` in one instant are an
+oscillation, and an error that names its pins.
 """
 
 from collections import Counter
@@ -69,8 +69,9 @@ class Delivery:
         self._touched: set[int] = set()
         self._instant: Ns = -1
         self._deliveries: Counter[str] = Counter()  # of this instant, by pin
-        by_name = sorted(range(len(parts)), key=lambda part: (part >= wiring.units, wiring.names[part]))
-        self._turn = [by_name.index(part) for part in range(len(parts))]  # whose turn it is in a round
+        wired = [(bool(drives), wiring.names[part] if drives else "") for part, drives in enumerate(wiring.drives)]
+        order = sorted(range(len(parts)), key=wired.__getitem__)
+        self._turn = [order.index(part) for part in range(len(parts))]  # whose turn it is in a round
 
     # -- what reaches whom -------------------------------------------------------------------------------
 

@@ -108,7 +108,7 @@ def _candidate(name: str, model: str, straps: dict[str, int], *, watched: bool =
     def make() -> GsC200:
         module = GsC200(model, straps, **options)  # type: ignore[arg-type]
         if watched:
-            for pin in set(module.pulse_output.pins.values()):
+            for pin in module.pulse_output.clocks:
                 module.watch(pin)
         return module
 

@@ -90,7 +90,7 @@ def test_a_drawing_has_the_pulses_on_all_three_clocks_with_and_without_a_wire(wi
 
 
 def test_a_velocity_move_ends_at_the_first_pulse_of_a_clock_that_is_wired_to_its_input() -> None:
-    """Page 8: "until the specified (x) input is brought to zero"."""
+    """Entry gsx: "until the specified (x) input is brought to zero"."""
     text = (
         CLOCKS
         + '[units.b]\nmodel = "gs-c200s"\n[[wires]]\nfrom = "a.CLOCK"\nto = "b.UI1"\n'

@@ -27,6 +27,10 @@ class PositionCounter:
         count = self._axis.shaft_at(now) - self._origin
         return (count + WRAP // 2) % WRAP - WRAP // 2 if self._wraps else count % POSITIONS
 
+    def below(self, now: Ns) -> bool:
+        """Whether a homing that was cut off has taken the GS-C200's counter below 0: it reads nearly ten million."""
+        return not self._wraps and self._axis.shaft_at(now) < self._origin
+
     def preset(self, position: int, now: Ns) -> None:
         """Call the present place `position`."""
         self._origin = self._axis.shaft_at(now) - position

@@ -305,7 +305,7 @@ class GsC200:
 
     def _single(self, frame: Frame, instruction: Instruction, now: Ns) -> None:
         """A delayed command outside a program: executed at once, as a program of one instruction."""
-        if self._counter.refuses(instruction, now):
+        if self._running.refuses(instruction, now):
             self._refuse(frame, 5, "the move would leave the position counter, 0 to 9999999", now)
         else:
             self._answer("Y", now)

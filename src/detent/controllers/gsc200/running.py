@@ -7,7 +7,7 @@ reached one instruction time later. What it waits for is explicit: `_timer`, a u
 from collections.abc import Callable
 from typing import ClassVar
 
-from detent.controllers.device import Executing, Finished, Output, Stop
+from detent.controllers.device import Cautioned, Executing, Finished, Output, Stop
 from detent.controllers.gsc200.commands import Instruction, Op
 from detent.controllers.gsc200.counter import PositionCounter
 from detent.controllers.gsc200.flow import Flow
@@ -61,7 +61,8 @@ class Running:
         return self._flow.rounds() if self.busy else []
 
     def run(self, program: Program, now: Ns) -> None:
-        """Start `program` at its first instruction. An empty one is done at once."""
+        """Start `program` at its first instruction. An empty one is done at once. An error of the last one is over."""
+        self.error = 0
         self._program = program
         self._flow.restart()
         if program.size:
@@ -71,7 +72,8 @@ class Running:
             self._end(now)
 
     def home(self, direction: int, now: Ns) -> bool:
-        """H. True if it is done already: both switches were closed, not a step was made."""
+        """H. True if it is done already: both switches were closed, not a step was made. An error of before is over."""
+        self.error = 0
         self._motion.home(direction, now)
         if self._motion.at_rest:
             self._homed(now)
@@ -130,6 +132,7 @@ class Running:
     def initialize(self, which: int, now: Ns) -> None:
         """I1 clears the position counter, I2 the user outputs, I3 both; 1 and 3 reset the driver, too."""
         if which & 1:
+            self.error = 0
             self._counter.preset(0, now)
             self._motion.pulse_reset(now)
         if which & 2:
@@ -247,24 +250,37 @@ class Running:
         if instruction.op is Op.GOTO:
             distance -= self._counter.read(now)
         if distance:
+            if instruction.op is Op.GOTO and self._counter.below(now):
+                self._out.append(Cautioned(now, step.text, _below(self._counter.read(now), step.text, distance)))
             self._flow.address = step.next
             self._motion.begin(abs(distance), 1 if distance > 0 else -1, now)
         else:
             self._go_on(step, now)
 
     def _velocity(self, step: Step, now: Ns) -> None:
-        direction, stop = step.instruction.value, USER_INPUTS[step.instruction.other]
-        if stop and self._inputs[stop] == LOW:
+        direction = step.instruction.value
+        if self._stopped(step.instruction):
             self._go_on(step, now)
         elif not self._refused(step.instruction, now):
             self._flow.address = step.next
-            self._waiting = stop
+            self._waiting = USER_INPUTS[step.instruction.other]
             self._endless = True
             self._motion.begin(self._counter.room(direction, now), direction, now)
 
+    def refuses(self, instruction: Instruction, now: Ns) -> bool:
+        """Whether the move would carry the counter off its ruler. Where the input is 0 already there is no move."""
+        if instruction.op is Op.VELOCITY and self._stopped(instruction):
+            return False
+        return self._counter.refuses(instruction, now)
+
+    def _stopped(self, instruction: Instruction) -> bool:
+        """Whether the input that ends a velocity move is 0 already."""
+        stop = USER_INPUTS[instruction.other]
+        return bool(stop) and self._inputs[stop] == LOW
+
     def _refused(self, instruction: Instruction, now: Ns) -> bool:
         """Whether the move would leave the counter: it takes its time, and the program ends with error 5."""
-        if not self._counter.refuses(instruction, now):
+        if not self.refuses(instruction, now):
             return False
         assert self._program is not None
         self.error = 5
@@ -303,3 +319,12 @@ class Running:
         Op.GOTO: _move,
         Op.VELOCITY: _velocity,
     }
+
+
+def _below(position: int, text: str, distance: int) -> str:
+    """What is unexpected of a goto where a homing was cut off below 0."""
+    way = "plus" if distance > 0 else "minus"
+    return (
+        f"a homing that was cut off has taken the counter below 0, where it reads {position}: {text} makes "
+        f"{abs(distance)} steps in direction {way}; H finds home, I1 clears the counter"
+    )

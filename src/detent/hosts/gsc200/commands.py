@@ -47,12 +47,15 @@ class Commands(Dialogue):
         tenths = round(seconds * 10)
         if tenths not in language.TENTHS or abs(seconds * 10 - tenths) > 1e-6:
             raise ValueError(f"a delay is 0.1 to 25.5 s, in tenths of a second, not {seconds:g} s")
+        self.begins()
         yield from self.delayed(f"D{tenths}", Again.NEVER)
 
     @operation
     def wait_for(self, input: int) -> Steps[None]:
         """W: be busy until user input 1 to 3 is one."""
-        yield from self.delayed(f"W{_in(language.PINS, input, 'an input')}", Again.WHEN_READY)
+        command = f"W{_in(language.PINS, input, 'an input')}"
+        self.begins()
+        yield from self.delayed(command, Again.WHEN_READY)
 
     @operation
     def pins(self) -> Steps[UserPins]:
@@ -82,13 +85,16 @@ class Commands(Dialogue):
     @operation
     def go_to(self, position: int) -> Steps[None]:
         """G: begin a move to a position, 0 to 9999999 (GS-C200), -8388608 to +8388607 (GS-C200S)."""
-        yield from self.delayed(f"G{self._position(position)}", Again.WHEN_READY)
+        command = f"G{self._position(position)}"
+        self.begins()
+        yield from self.delayed(command, Again.WHEN_READY)
 
     @operation
     def move(self, steps: int) -> Steps[None]:
         """+ or -: begin a move by 1 to 999999 steps, with their sign."""
         if abs(steps) not in language.MOVES:
             raise ValueError(f"a move has 1 to {language.MOVES[-1]} steps, not {steps}: move_to() goes further")
+        self.begins()
         yield from self.delayed(f"{steps:+d}", Again.NEVER)
 
     @operation
@@ -98,7 +104,9 @@ class Commands(Dialogue):
         With `until_low` it ramps down when user input 1 to 3 is zero.
         """
         stop = "" if until_low is None else str(_in(language.PINS, until_low, "an input"))
-        yield from self.delayed(("g" if self.signed else "G") + _sign(direction) + stop, Again.NEVER)
+        command = ("g" if self.signed else "G") + _sign(direction) + stop
+        self.begins()
+        yield from self.delayed(command, Again.NEVER)
 
     @operation
     def find_home(self, direction: int = 1) -> Steps[None]:
@@ -106,17 +114,27 @@ class Commands(Dialogue):
 
         At the start-stop speed. A GS-C200 clears the program in RAM, too.
         """
-        yield from self.order(f"H{_sign(direction)}", Again.NEVER)
+        command = f"H{_sign(direction)}"
+        self.begins()
+        yield from self.order(command, Again.NEVER)
+        self._homing, self._cut = True, False
 
     @operation
     def zero_speed(self) -> Steps[None]:
         """Z: ramp down, and end the program."""
         yield from self.order("Z", Again.AT_ONCE)
+        self._cut_off()
 
     @operation
     def kill(self) -> Steps[None]:
         """K: stop the pulses at once, and end the program."""
         yield from self.order("K", Again.AT_ONCE)
+        self._cut_off()
+
+    def _cut_off(self) -> None:
+        """A stop ends a homing, wherever that has come to."""
+        self._cut = self._cut or (self._homing and not self.signed)
+        self._homing = False
 
     # -- the position counter ----------------------------------------------------------------------------
 
@@ -140,6 +158,8 @@ class Commands(Dialogue):
         if not which:
             raise ValueError("say what to clear: position, outputs, or both")
         yield from self.delayed(f"I{which}", Again.WHEN_READY)
+        if position and not self.programming:
+            self._cut = False
 
     # -- programs ----------------------------------------------------------------------------------------
 
@@ -168,6 +188,7 @@ class Commands(Dialogue):
     @operation
     def execute(self) -> Steps[None]:
         """E: start the program in RAM at its first instruction; it ends programming mode, too."""
+        self.begins()
         yield from self.order("E", Again.NEVER)
 
     @operation

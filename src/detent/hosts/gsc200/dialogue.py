@@ -91,11 +91,17 @@ class Dialogue(Axis):
         self._stale = True  # something may have come that nobody asked for
         self._unended = False  # the last frame may have lost its end: then it is the beginning of the next
         self._spoken: Spoken | None = None  # the last exchange that was understood
+        self._begun = False  # this driver has begun what an error that the module keeps would be of, or has seen it
+        self._clean = False  # the module is known to keep no error
+        self._owed = ""  # an error of what was begun that was told to us between, and not yet by us
+        self._homing = False  # homing was begun, and was not seen to end
+        self._cut = False  # a homing was cut off: a GS-C200's counter may have gone below 0
 
     def forget(self) -> None:
         """The connection was lost: what comes first may be old, and the module may have been switched off."""
         self._stale = self._unended = True
-        self.programming = False
+        self.programming = self._begun = self._clean = False
+        self._owed = ""
 
     # -- exchanges ---------------------------------------------------------------------------------------
 
@@ -152,24 +158,49 @@ class Dialogue(Axis):
 
     @operation
     def feedback(self) -> Steps[Feedback]:
-        """F: whether it is busy; an error that ended a program is told once."""
+        """F: whether it is busy; an error that ended a program is told once, whoever started that."""
         text = yield from self.say("F", STATE, Again.AT_ONCE)
+        self._clean = text != "B"
+        self._begun = self._begun or text == "B"
         return Feedback(text == "B", text if text.startswith("E") else "")
 
     @operation
     def moving(self) -> Steps[bool]:
-        """Whether it is busy: with a move, homing, or a program. Raises MotionFailed for an error that it kept."""
-        busy, error = yield from self.feedback()
+        """Whether it is busy: with a move, homing, or a program.
+
+        Raises MotionFailed for an error of what this driver has begun, or has seen going on. One that was there before,
+        of an old program, is nothing that failed here: `feedback` tells it.
+        """
+        busy = (yield from self._asked()).busy
+        error, self._owed = self._owed, ""
         if error:
             raise MotionFailed(self.title, f"ended early: {ERRORS[error]} ({error})")
         return busy
+
+    def _asked(self) -> Steps[Feedback]:
+        """F; an error of what this driver has begun, or has seen going on, is owed to whoever asks how that went."""
+        told = yield from self.feedback()
+        if told.error and self._begun:
+            self._owed = told.error
+        self._begun = self._begun and told.busy
+        self._homing = self._homing and told.busy
+        return told
+
+    def begins(self) -> None:
+        """Something is begun: an error that the module keeps from here on is of this."""
+        self._begun, self._clean, self._owed = True, False, ""
+
+    def fresh(self) -> Steps[None]:
+        """Fetch an error that an old program may have left, so that it is not blamed on what is begun now (F)."""
+        if not self._clean:
+            yield from self.feedback()
 
     # -- what goes wrong ---------------------------------------------------------------------------------
 
     def _settled(self) -> Steps[bool]:
         """Wait until it is ready, a moment at most. Whether it is."""
         for _ in range(MOMENTS):
-            if not (yield from self.moving()):
+            if not (yield from self._asked()).busy:
                 return True
             yield Pause(MOMENT)
         return False

@@ -37,9 +37,15 @@ class GsC200(Commands):
 
     @operation
     def move_to(self, position: int) -> Steps[None]:
-        """Begin a move to `position` and return."""
+        """Begin a move to `position` and return.
+
+        Raises Refused if a homing that was stopped has taken a GS-C200's counter below 0: it reads just below ten
+        million then, and the move would go that far away. `go_to` says it all the same.
+        """
         self._position(position)
         self._commanded()
+        yield from self.fresh()
+        yield from self._above(position)
         yield from self._at_slew()
         yield from self.go_to(position)
 
@@ -49,6 +55,7 @@ class GsC200(Commands):
         if steps:
             self._commanded()
             if abs(steps) in language.MOVES:
+                yield from self.fresh()
                 yield from self._at_slew()
             yield from self.move(steps)
 
@@ -59,6 +66,7 @@ class GsC200(Commands):
         if not rate:
             raise ValueError("a rate of 0 is no run: stop() ramps down, halt() stops at once")
         self._commanded()
+        yield from self.fresh()
         if tens != self._top:
             yield from self._set_top(tens)
         yield from self.go(1 if rate > 0 else -1)
@@ -79,6 +87,8 @@ class GsC200(Commands):
 
         At the start-stop speed. A GS-C200 clears the program in RAM, too.
         """
+        if not self.programming:
+            yield from self.fresh()
         yield from self.find_home(direction)
 
     @operation
@@ -118,6 +128,19 @@ class GsC200(Commands):
         yield from self.set_ramp(ramp)
         self._slew = slew
         return Speeds(10 * start, 10 * slew, 2 * ramp / both if slew > start else 0.0)
+
+    def _above(self, position: int) -> Steps[None]:
+        """Raise Refused where a homing that was cut off has taken the counter below 0."""
+        if not self._cut:
+            return
+        here = yield from self.position()
+        if here - position > language.POSITIONS[self.model][-1] // 2:
+            raise Refused(
+                self.title,
+                f"homing was stopped on its way below 0, where the counter reads {here}: a move to {position} would "
+                f"make {here - position} steps away from it; home() again, or set_position(0) where it stands",
+                code="E5",
+            )
 
     def _commanded(self) -> None:
         """Raise Busy in programming mode, where moves and settings would be stored."""
