@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from detent.controllers.dcb274.link import NO_NAME, is_name
 from detent.ramps.timer_table import LEAST_COUNT, count_of, rate_of
 
 LEAST, MOST = -8_388_607, 8_388_607  # positions
@@ -110,6 +111,29 @@ class Address(Number):
     def unpack(self, data: bytes) -> int | None:
         """The address, unless a program may not stand there."""
         return self.read(int.from_bytes(data, "little"))
+
+
+class Name(Number):
+    """The name of an axis behind ``|``, as `link.is_name` has it; `NO_NAME` is the axis itself."""
+
+    __slots__ = ()
+
+    @property
+    def words(self) -> str:
+        """What may stand there."""
+        return f"{self.what}; none is the axis itself"
+
+    def read(self, number: int) -> int | None:
+        """The name, if it is one."""
+        return number if number == NO_NAME or is_name(number) else None
+
+    def write(self, value: int) -> str:
+        """The character; nothing for the axis itself."""
+        return chr(value) if value != NO_NAME else ""
+
+    def unpack(self, data: bytes) -> int | None:
+        """The name, if it is one."""
+        return self.read(data[0])
 
 
 def split(text: str) -> list[int] | None:

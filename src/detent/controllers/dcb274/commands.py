@@ -11,7 +11,8 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 from detent.controllers.dcb274 import arguments
-from detent.controllers.dcb274.arguments import LEAST, MOST, Address, Number, Rate
+from detent.controllers.dcb274.arguments import LEAST, MOST, Address, Name, Number, Rate
+from detent.controllers.dcb274.link import NO_NAME, is_name
 from detent.controllers.device import CommandHelp
 from detent.ticks import MS, US, Ns
 
@@ -129,7 +130,7 @@ def _byte(what: str, high: int = 255, low: int = 0) -> Number:
 _POSITION = Number("a position", LEAST, MOST, 3)
 _STEPS = Number("steps", 0, 16_777_215, 3)
 _SPEED_OF = Rate("steps/s", 0, 36_000, 2)
-_SIGNED_SPEED = Rate("steps/s with their sign, 0 stops;", -36_000, 36_000, 2)
+_SIGNED_SPEED = Rate("steps/s with their sign (0 stops)", -36_000, 36_000, 2)
 _CELL = Number("an address", 0, 2047, 2)
 _PROGRAM_BYTE = Address("an address", 0, 2047, 2)
 _OUTPUTS = _byte("output flags", 63)
@@ -147,7 +148,7 @@ TABLE: Final[tuple[Row, ...]] = (
     Row(Op.DIVIDE, (_byte("a divisor", low=1),), 2, "Divide all speeds.", 37),
     Row(Op.RETIRED, (_byte("anything"),), 2, "Nothing: retired, see Y.", 37),
     Row(Op.FIND_HOME, (_SPEED_OF, _byte("0 (minus) or 1 (plus)", 1)), 3, "Find the home switch.", 38, action=True),
-    Row(Op.GO, (Address("an address, 2048 branches on the ports;", 0, BRANCH, 2), _byte("1: trace", 1)), 3,
+    Row(Op.GO, (Address("an address (2048 branches on the ports)", 0, BRANCH, 2), _byte("trace", 1)), 3,
         "Execute the program from an address.", 38, action=True),
     Row(Op.RESOLUTION, (_byte("a table", 5),), 2, "Set the step resolution.", 40, action=True),
     Row(Op.INITIAL, (_SPEED_OF,), 3, "Set the initial velocity.", 40, time=_SPEED),
@@ -159,7 +160,7 @@ TABLE: Final[tuple[Row, ...]] = (
         needs=2),
     Row(Op.NEXT_TRIP, (_POSITION, _OUTPUTS), 5, "Set the outputs now, and the position of the next special trip.", 42,
         typed=False),
-    Row(Op.LOOP_ON_PORT, (Address("an address, 2048 waits here;", 0, BRANCH, 2),
+    Row(Op.LOOP_ON_PORT, (Address("an address (2048 waits here)", 0, BRANCH, 2),
                           _byte("2 (port - 1), 1 more for high", 9)), 4,
         "Jump to an address unless a port is low or high.", 44, typed=False, time=PORT_TEST),
     Row(Op.OPTIONS, (_byte("option flags, 128 reads them"),), 2, "Set the hardware options.", 44,
@@ -170,7 +171,7 @@ TABLE: Final[tuple[Row, ...]] = (
     Row(Op.QUERY, (_CELL,), 0, "List the program from an address (single mode).", 48, result="the program"),
     Row(Op.INDEX_TO, (_POSITION,), 4, "Move to a position.", 48, action=True, time=_INDEX),
     Row(Op.SAVE, (), 0, "Save the parameters and the program at 128-191 to NV memory.", 49, time=_BLOCK),
-    Row(Op.TRIP, (_POSITION, Address("an address, 0 turns it off;", 0, 255)), 5,
+    Row(Op.TRIP, (_POSITION, Address("an address (0 turns it off)", 0, 255)), 5,
         "Call a routine of the running program at a position.", 49),
     Row(Op.SLEW, (_SPEED_OF,), 3, "Set the slew velocity.", 50, time=_SPEED),
     Row(Op.WAIT, (Number("units of 10 ms", 0, 65_535, 2),), 3, "Wait until an index or homing is complete, and then.",
@@ -179,7 +180,7 @@ TABLE: Final[tuple[Row, ...]] = (
     Row(Op.EXAMINE, (), 0, "Print the settings; 26, the model, in party line.", 52, result="the settings"),
     Row(Op.CURRENT, (_byte("hold, percent of 4 A", 100), _byte("run, percent of 4 A", 100)), 3,
         "Set the hold and run currents.", 52),
-    Row(Op.POSITION, (_byte("1: at every change (single mode)", 1),), 2, "Print the position.", 53,
+    Row(Op.POSITION, (_byte("readout at every change, single mode", 1),), 2, "Print the position.", 53,
         result="the position"),
     Row(Op.READ_MEMORY, (_CELL, _byte("bytes")), 0, "Read NV memory.", 54, result="the bytes", time=_MEMORY),
     Row(Op.READ_INPUTS, (_byte("0 or 1", 1),), 2, "Read limits, home and ports, or the jog inputs.", 54,
@@ -189,7 +190,7 @@ TABLE: Final[tuple[Row, ...]] = (
     Row(Op.MOVING, (), 1, "Print the moving status: 0 at rest, 1 indexing or homing, 3 constant speed.", 56,
         result="the status"),
     Row(Op.WRITE_MEMORY, (_CELL, _byte("a byte")), 0, "Write a byte of NV memory.", 56, time=_MEMORY),
-    Row(Op.TERMINATE, (Number("the name of an axis", 0x21, 0x7E),), 2, "Terminate the program of one axis.", 57),
+    Row(Op.TERMINATE, (Name("the name of an axis", 0x21, 0x7E),), 2, "Terminate the program of one axis.", 57),
 )  # fmt: skip
 
 ROWS: Final = {row.op: row for row in TABLE}
@@ -246,15 +247,13 @@ def parse(text: str) -> Instruction:
 def _name(text: str) -> tuple[int, ...]:
     """The name behind `|`; none: the axis itself."""
     text = text.strip(" ").removesuffix(";")
-    if len(text) > 1 or (text and not 0x21 <= ord(text) <= 0x7E):
+    if len(text) > 1 or (text and not is_name(ord(text))):
         raise Refusal(f"| takes the name of an axis, not {text[:20]!r}")
-    return (ord(text),) if text else (0,)
+    return (ord(text),) if text else (NO_NAME,)
 
 
 def spell(instruction: Instruction) -> str:
     """The instruction as Q lists it: letter and values, blanks between."""
     row = ROWS[instruction.op]
-    if row.op is Op.TERMINATE:
-        return f"{row.letter} {chr(instruction.values[0])}" if instruction.values[0] else row.letter
     values = [argument.write(value) for argument, value in zip(row.arguments, instruction.values, strict=True)]
-    return " ".join((row.letter, *values))
+    return " ".join((row.letter, *values)).rstrip(" ")

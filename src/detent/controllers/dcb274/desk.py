@@ -10,7 +10,7 @@ from typing import Final, Protocol
 
 from detent.controllers.dcb274 import commands, settings
 from detent.controllers.dcb274.commands import ROWS, Instruction, Op, Refusal
-from detent.controllers.dcb274.link import CR, LF, Mode, is_name
+from detent.controllers.dcb274.link import CR, LF, NO_NAME, Mode, is_name
 from detent.controllers.dcb274.memory import PAGE, PARAMETERS, PROTECTED, SHADOW, SIZE
 from detent.controllers.dcb274.program import END, allowed, encode
 from detent.controllers.dcb274.running import Running
@@ -39,6 +39,15 @@ _CLOSED = (Stage.HELD, Stage.MOTION, Stage.WAIT)
 _BUSY = (Stage.EXECUTING, Stage.STORING)
 
 
+class _Stored(Enum):
+    """What is being stored, and so what follows when it is."""
+
+    CELLS = "nothing follows"
+    FACTORY = "factory values: they are loaded"
+    NAME = "the name: the axis has it"
+    INSTRUCTION = "an instruction of program mode, or its end mark"
+
+
 class Speaker(Protocol):
     """Where answers go: the firmware, which knows the mode."""
 
@@ -48,6 +57,9 @@ class Speaker(Protocol):
 
     def send(self, text: str, now: Ns) -> None:
         """Send characters as they are."""
+
+    def spend_contacts(self) -> None:
+        """A stop: GO and jog inputs that are active now count again only when they have been open."""
 
 
 class Desk:
@@ -67,8 +79,8 @@ class Desk:
         self._image = b""  # what is being stored
         self._cells: range | tuple[int, ...] = ()  # of it
         self._result = ""  # of the command that stores
-        self._reload = False  # the parameters, when it is stored
-        self._name = 0  # that is being stored
+        self._stored = _Stored.CELLS
+        self._name = NO_NAME  # that is being stored
         self._ram = b""  # with the instruction that is being stored
         self._length = 0  # of that instruction
 
@@ -81,6 +93,21 @@ class Desk:
     def closed(self) -> bool:
         """Whether only interrupts are taken: the pending period, and W."""
         return self.stage in _CLOSED
+
+    @property
+    def setting_off(self) -> bool:
+        """Whether the command in hand would set the axis in motion, and has not done so yet."""
+        return (
+            self.stage in (Stage.HELD, Stage.EXECUTING)
+            and not self.programming
+            and self._instruction is not None
+            and self._work.moves(self._instruction)
+        )
+
+    @property
+    def speeds_pending(self) -> bool:
+        """Whether an M waits for the ramp of the M before it (page 28)."""
+        return self.stage is Stage.HELD and self._instruction is not None and self._instruction.op is Op.VELOCITY
 
     # -- entry -------------------------------------------------------------------------------------------
 
@@ -117,7 +144,7 @@ class Desk:
             raise Refusal("Q lists in single mode only")
 
     def cancel(self, now: Ns) -> None:
-        """@ in the pending period: the command that waits is answered #."""
+        """A stop: the command that waits, or would set off a motion, is answered #."""
         self._finish("#", now)
 
     # -- execution ---------------------------------------------------------------------------------------
@@ -129,6 +156,8 @@ class Desk:
             if self.programming:
                 length = ROWS[self._instruction.op].length or 1
                 self.stage, self.timer = Stage.EXECUTING, now + self._work.storing(self._address, length)
+            elif self.setting_off and self._work.ports.stopped:
+                self._refuse(commands.spell(self._instruction), "the soft stop input is active: nothing moves", now)
             elif self._work.ready(self._instruction, now):
                 self.stage, self.timer = Stage.EXECUTING, now + self._work.time(self._instruction)
         elif self.stage is Stage.MOTION and not self._work.motion.indexing:
@@ -161,8 +190,13 @@ class Desk:
                 self._finish("", now)
                 self._running.go(values[0], bool(values[1]), now)
             case Op.TERMINATE:
-                work.motion.halt(now)
+                if values[0] in (NO_NAME, work.settings.name):
+                    self._speaker.spend_contacts()
+                    work.motion.halt(now)
                 self._finish("", now)
+            case Op.SOFT_STOP:
+                self._speaker.spend_contacts()
+                self._finish(work.obey(instruction, now, named=self._speaker.mode.named), now)
             case Op.PROGRAM:
                 self.programming, self._address = True, values[0]
                 self._finish("", now)
@@ -172,11 +206,11 @@ class Desk:
                 self._list(PAGE_OF_LISTING, now)
             case Op.SAVE:
                 cells = work.settings.cells() | dict(enumerate(work.memory.ram, SHADOW.start))
-                self._store(work.memory.with_bytes(cells), tuple(cells), now)
+                self._store(work.memory.with_bytes(cells), tuple(cells), now, _Stored.CELLS)
             case Op.CLEAR:
                 self._clear(values[0], now)
             case Op.WRITE_MEMORY:
-                self._store(work.memory.with_bytes({values[0]: values[1]}), (values[0],), now)
+                self._store(work.memory.with_bytes({values[0]: values[1]}), (values[0],), now, _Stored.CELLS)
             case _:
                 self._finish(work.obey(instruction, now, named=self._speaker.mode.named), now)
 
@@ -190,15 +224,27 @@ class Desk:
         first = (page - 1) * PAGE
         cells = dict.fromkeys(range(first, first + PAGE), END)
         if page == 1:
-            cells = {a: v for a, v in {**cells, **settings.factory("A")}.items() if a not in PROTECTED}
-        self._store(memory.with_bytes(cells), tuple(cells), now, result, reload=page == 1)
+            cells = {a: v for a, v in {**cells, **settings.factory()}.items() if a not in PROTECTED}
+            if (mode := memory.nv[settings.READOUT]) & 1:
+                cells[settings.READOUT] = mode - 1  # "Auto Position Readout Off" (page 32); the cell is ours (E)
+        self._store(
+            memory.with_bytes(cells), tuple(cells), now, _Stored.FACTORY if page == 1 else _Stored.CELLS, result
+        )
 
     def _reloaded(self, now: Ns) -> None:
         work = self._work
+        registers, name, resolution = work.settings, work.settings.name, work.settings.resolution
+        for_now = registers.plc_for_now
         work.memory.load_shadow()
-        work.settings.load(work.memory)
+        registers.load(work.memory)
+        registers.plc_for_now = for_now  # "temporarily" is until a reset (page 45)
+        if self._speaker.mode is Mode.DAISY:
+            registers.name = name  # it has that one "until a hardware reset is made" (page 24)
+        if registers.resolution != resolution:
+            work.motion.reset_phase(now)
         work.trip.reset(now)
         work.ports.show(now)
+        work.motion.options_changed(now)
 
     # -- NV memory ---------------------------------------------------------------------------------------
 
@@ -215,7 +261,7 @@ class Desk:
             self._entered()
             self._finish("", now)
         else:
-            self._store(image, cells, now)
+            self._store(image, cells, now, _Stored.INSTRUCTION)
 
     def _entered(self) -> None:
         """An instruction of program mode is in memory, or the end mark, which ends the mode."""
@@ -224,17 +270,15 @@ class Desk:
         self._address += self._length
         self.programming = self._instruction.op is not Op.PROGRAM
 
-    def _store(
-        self, image: bytes, cells: range | tuple[int, ...], now: Ns, result: str = "", *, reload: bool = False
-    ) -> None:
+    def _store(self, image: bytes, cells: range | tuple[int, ...], now: Ns, what: _Stored, result: str = "") -> None:
         self.stage = Stage.STORING
-        self._image, self._cells, self._result, self._reload = image, cells, result, reload
+        self._image, self._cells, self._result, self._stored = image, cells, result, what
         self._out.append(StoreImage(now, image))
 
     def store_name(self, name: int, now: Ns) -> None:
         """^N: the name is stored at once."""
         self._name = name
-        self._store(self._work.memory.with_bytes({settings.NAME: name}), (settings.NAME,), now)
+        self._store(self._work.memory.with_bytes({settings.NAME: name}), (settings.NAME,), now, _Stored.NAME)
 
     def stored(self, ok: bool, now: Ns) -> None:
         """The image was stored, or not: then the memory is as it was, and the command is answered #."""
@@ -242,13 +286,14 @@ class Desk:
             return
         if ok:
             self._work.memory.commit(self._image, self._cells)
-            if self._name:
-                self._work.settings.name = self._name
-            elif self.programming:
-                self._entered()
-            if self._reload:
-                self._reloaded(now)
-        self._image, self._name = b"", 0
+            match self._stored:
+                case _Stored.NAME:
+                    self._work.settings.name = self._name
+                case _Stored.INSTRUCTION:
+                    self._entered()
+                case _Stored.FACTORY:
+                    self._reloaded(now)
+        self._image, self._name = b"", NO_NAME
         self._finish(self._result if ok else "#", now)
 
     # -- keys while listing or naming --------------------------------------------------------------------

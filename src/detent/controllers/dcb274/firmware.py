@@ -40,6 +40,7 @@ from detent.uart import Char, Format, SerialPort, Transmitter
 
 SIGN_ON = f"    110 AMS SMC-27X2 {VERSION}\r\n"  # behind the echoed space
 CONFLICT = "GO-SS conflict\r\n"
+_CONTACTS = ("GO", "JOG1", "JOG2")
 
 
 class Dcb274:
@@ -89,6 +90,8 @@ class Dcb274:
         self._candidate = 0  # the name typed before sign-on
         self._after_line_feed = False  # before sign-on: a name behind it makes a daisy chain
         self._conflict = False  # GO and SS were both true
+        self._stopped = False  # the soft stop input was active when it was looked at last
+        self._spent: set[str] = set()  # GO and jog inputs that were active at a stop, and have not been open since
         self._shown = 0  # the position printed last, for Z 1
         self._readout_at: Ns = NEVER
 
@@ -158,15 +161,12 @@ class Dcb274:
         if pin not in self._ports.levels:
             return
         self._set_inputs.add(pin)
-        before = self._ports.active("SS")
         changed = self._ports.levels[pin] != level
         self._ports.levels[pin] = level
         if not self._powered:
             return
         if changed:
-            self._heed(self._motion.input_changed(pin, level, now), now)
-            if self._ports.active("SS") and not before:
-                self._soft_stop(now)
+            self._heed(self._motion.input_changed(pin, now), now)
         self._poll(now)
         self.advance(now)
 
@@ -176,6 +176,7 @@ class Dcb274:
             self.advance(now)
             self._set_inputs.add(pin)
             self._ports.levels[pin] = level
+            self._motion.step_found(now)
         else:
             self.set_pin(pin, level, now)
 
@@ -183,8 +184,6 @@ class Dcb274:
         """The NV memory was written, or not."""
         self._quiet = False
         self._desk.stored(ok, now)
-        if isinstance(self._entry, NamedEntry) and self.mode is Mode.PARTY:
-            self._entry.name = self._settings.name
         self._poll(now)
         self.advance(now)
 
@@ -278,7 +277,7 @@ class Dcb274:
 
     def cuts(self, now: Ns, axis: str = "") -> Sequence[Stop]:
         """The limit ahead unless it is gentle (l 32), and the home switch while it is looked for."""
-        return self._motion.cuts() if self._powered else ()
+        return self._motion.cuts(now) if self._powered else ()
 
     def switches(self, axis: str = "") -> Sequence[str]:
         """Both limits and home."""
@@ -337,10 +336,13 @@ class Dcb274:
         self._out.append(StoreImage(now, self.memory.nv))
 
     def start(self, now: Ns) -> None:
-        """Start the program that was loaded, as G would; nothing happens while one runs, or without power."""
+        """Start the program that was loaded, as G would.
+
+        Nothing happens without power, while a program runs, a jog moves the axis, or the soft stop input is active.
+        """
         self.advance(now)
         self._quiet = False
-        if self._powered and not self._running.active:
+        if self._powered and not (self._running.active or self._motion.jogging or self._ports.stopped):
             self._running.go(self._base, False, now)
 
     def halt(self, now: Ns) -> None:
@@ -372,11 +374,14 @@ class Dcb274:
         self._forget()
         if self._ports.active("GO") and self._ports.active("SS"):
             self._settings.plc_for_now = self._conflict = True
+        self._stopped = self._ports.stopped
+        if "STEP" in self._set_inputs:
+            self._motion.step_found(now)
         if party or self._straps["PARTY"] == HIGH:
             self._listen(Mode.PARTY)
         else:
             self._listen(Mode.WAITING)
-        if self.memory.instruction(POWER_UP) is not None:
+        if self.memory.instruction(POWER_UP) is not None and not self._stopped:
             self._running.go(POWER_UP, False, now)
         self._poll(now)
 
@@ -417,9 +422,9 @@ class Dcb274:
                 self._sign_on(value, now)  # a program at 1600 does not keep anybody from signing on
                 return
             entered = self._entry.feed_closed(value)
+            self._transmitter.send(entered.reply, now)
             if entered.interrupt:
                 self._interrupt(entered.interrupt, now)
-            self._transmitter.send(entered.reply, now)
         elif value == CTRL_N:
             self._entry.clear()
             desk.ask_name(now)
@@ -459,8 +464,9 @@ class Dcb274:
         self._desk.reset()
         self._entry.clear()
         self._inbox.clear()
+        self.spend_contacts()
         if self.mode is not Mode.WAITING:
-            self.send("#\n" if self.mode.named else "#", now)
+            self.send("#\n" if self.mode.named else "#\r\n", now)
 
     def _interrupt(self, value: int, now: Ns) -> None:
         """@ or | on a line that is closed."""
@@ -469,18 +475,36 @@ class Dcb274:
         else:
             self._motion.halt(now)
             self._running.reset()
-            if self._desk.closed:
+            self.spend_contacts()
+            self._inbox.clear()
+            if self._desk.closed or self._desk.setting_off:
                 self._desk.cancel(now)
 
     def _soft_stop(self, now: Ns) -> None:
-        """@ or the soft stop input: decelerate; a program ends, a pending command is cancelled (page 28)."""
+        """@ or the soft stop input: decelerate; a program ends, a pending command is cancelled (page 28).
+
+        So is a command that executes and would set off a motion at the end of its time, and what was typed ahead.
+        """
+        self.spend_contacts()
+        self._inbox.clear()
         if self._running.active:
             self._running.soft_stop(now)
-        elif self._desk.closed:
-            self._motion.soft_stop_after_ramp(now)
+        elif self._desk.closed or self._desk.setting_off:
+            if self._desk.speeds_pending:
+                self._motion.soft_stop_after_ramp(now)
+            else:
+                self._motion.soft_stop(now)
             self._desk.cancel(now)
         else:
             self._motion.soft_stop(now)
+
+    def spend_contacts(self) -> None:
+        """A stop leads to rest: a contact that sets something going does so again only when it has been open."""
+        self._spent = {pin for pin in _CONTACTS if self._ports.active(pin)}
+
+    def _asks(self, pin: str) -> bool:
+        """Whether an input that sets something going is active, and no stop has come since that."""
+        return self._ports.active(pin) and pin not in self._spent
 
     def send(self, text: str, now: Ns) -> None:
         """Send characters as they are."""
@@ -504,8 +528,14 @@ class Dcb274:
         """Look at everything that waits for a condition; what has come true goes on in this instant."""
         if not self._powered:
             return
+        stopped = self._ports.stopped
+        if stopped and not self._stopped:
+            self._soft_stop(now)
+        self._stopped = stopped
         self._running.poll(now)
         self._desk.poll(now)
+        if isinstance(self._entry, NamedEntry):
+            self._entry.name = self._settings.name
         while self._inbox and not self._desk.busy:
             self._take(self._inbox.popleft(), now)
             self._desk.poll(now)
@@ -520,15 +550,19 @@ class Dcb274:
     def _test_inputs(self, now: Ns) -> None:
         """Jog and go, in the idle state: no command begun or in hand, no program (page 27)."""
         desk, motion, ports = self._desk, self._motion, self._ports
-        idle = desk.stage is Stage.FREE and not desk.programming and not self._running.active and self._entry.empty
-        if not idle:
+        if self._spent:
+            self._spent = {pin for pin in self._spent if ports.active(pin)}
+        wanted = 0 if ports.stopped else self._asks("JOG1") - self._asks("JOG2")
+        if motion.jogging:  # its release is heeded whatever else is going on
+            motion.jog(wanted, ports.active("JOG-S"), now)
             return
-        if not motion.jogging and not motion.completing(now) and ports.active("GO") and not ports.active("SS"):
+        idle = desk.stage is Stage.FREE and not desk.programming and not self._running.active and self._entry.empty
+        if not idle or ports.stopped:
+            return
+        if not motion.completing(now) and self._asks("GO"):
             self._running.go(0, False, now)
-        elif motion.at_rest or motion.jogging:
-            direction = ports.active("JOG1") - ports.active("JOG2")
-            if direction or motion.jogging:
-                motion.jog(direction, ports.active("JOG-S"), now)
+        elif motion.at_rest and wanted:
+            motion.jog(wanted, ports.active("JOG-S"), now)
 
     def _read_out(self, now: Ns) -> None:
         """Z 1: print a changed position when the line is free (page 53)."""

@@ -2,7 +2,7 @@
 
 An entry takes characters one by one and says what is sent back and which command line is complete. What a single
 character does at once (ESC, ^C, ^N, ^P) is the firmware's business, as is the @ of a line that is closed because
-a program runs or a command waits.
+a program runs or a command waits. What may be the name of an axis is said here, once for all who ask.
 """
 
 from enum import Enum
@@ -14,6 +14,8 @@ SINGLE_LONGEST: Final = 15  # characters (page 22)
 NAMED_LONGEST: Final = 12  # behind the name (page 25)
 NOT_NAMES: Final = frozenset(b"[\\]^_`@") | {CTRL_C, CR, LF}  # "non-valid names" (page 23)
 FIRST_PRINTABLE, LAST_PRINTABLE = 0x20, 0x7E
+NO_NAME: Final = 0  # (E) no axis has the name NUL: it stands for none, as behind `|` in a program
+FACTORY_NAME: Final = ord("A")  # "usually A" (page 5)
 
 
 class Mode(Enum):
@@ -31,8 +33,11 @@ class Mode(Enum):
 
 
 def is_name(value: int) -> bool:
-    """Whether a character may be a name. SPACE signs on, and the single-character commands are what they are."""
-    return value <= LAST_PRINTABLE and value not in NOT_NAMES and value not in (SPACE, ESC, CTRL_N, CTRL_P)
+    """Whether a character may be a name: any, "including control characters" (page 23), but those of the list.
+
+    SPACE signs on, the single-character commands are what they are, and NUL is `NO_NAME`.
+    """
+    return NO_NAME < value <= LAST_PRINTABLE and value not in NOT_NAMES and value not in (SPACE, ESC, CTRL_N, CTRL_P)
 
 
 def next_name(value: int) -> int:
@@ -46,8 +51,8 @@ def next_name(value: int) -> int:
 class Entered(NamedTuple):
     """What one character brings.
 
-    `reply` goes back at once; `line` is complete if it is not None; `too_long` says that more was typed than fits;
-    `interrupt` is a single-character command for this axis.
+    `reply` goes back at once, before whatever the character does; `line` is complete if it is not None; `too_long`
+    says that more was typed than fits; `interrupt` is a single-character command for this axis.
     """
 
     reply: bytes = b""
@@ -128,14 +133,15 @@ class _Place(Enum):
 
     START = "at its start"
     MINE = "a line for this axis"
-    OTHERS = "a line for somebody else"
-    MAYBE = "a closed line behind this axis' name"
+    OTHERS = "a line for somebody else, or one that is not taken"
     TAKEN = "a closed line that was an interrupt"
 
 
 class NamedEntry:
     """Lines that begin with a name: LF, name, up to 12 characters, LF. Only the named axis answers.
 
+    The name is echoed at once, whatever the axis is about: a host waits for each echo (page 25) before it sends the
+    next character, be it the ``|`` or ``@`` that ends a program. A line that is closed echoes nothing else.
     On a daisy chain every axis passes on what is not for it, and what is for it as its echo.
     """
 
@@ -156,7 +162,7 @@ class NamedEntry:
     def feed(self, value: int) -> Entered:
         """Take one character."""
         if self._place is _Place.START:
-            return self._begin(value, _Place.MINE)
+            return self._begin(value)
         if self._place is _Place.TAKEN:
             return self._taken(value)
         if self._place is not _Place.MINE:
@@ -172,18 +178,15 @@ class NamedEntry:
         return Entered(bytes((value,)))
 
     def feed_closed(self, value: int) -> Entered:
-        """Take one character while no line is accepted: name and @, name and | are; their echo comes with them."""
+        """Take one character while no line is accepted: only name and @, name and | are."""
         match self._place:
             case _Place.START:
-                return self._begin(value, _Place.MAYBE)
-            case _Place.MAYBE if value in b"@|":
+                return self._begin(value)
+            case _Place.MINE if value in b"@|" and not self._text:
                 self._place = _Place.TAKEN
-                echo = (value,) if self._passes else (self.name, value)
-                return Entered(bytes(echo), interrupt=value)
+                return Entered(bytes((value,)), interrupt=value)
             case _Place.TAKEN:
                 return self._taken(value)
-            case _Place.MINE:
-                self._place = _Place.OTHERS  # a line that a program has cut off
         return self._foreign(value)
 
     def skips(self, value: int) -> bool:
@@ -208,16 +211,13 @@ class NamedEntry:
         self._text.clear()
         self._too_long = False
 
-    def _begin(self, value: int, mine: _Place) -> Entered:
+    def _begin(self, value: int) -> Entered:
         """The character behind a LF."""
         passed = bytes((value,)) if self._passes else b""
         if value == LF:
             return Entered(passed)
-        if value != self.name:
-            self._place = _Place.OTHERS
-            return Entered(passed)
-        self._place = mine
-        return Entered(passed if mine is _Place.MAYBE else bytes((value,)))
+        self._place = _Place.MINE if value == self.name else _Place.OTHERS
+        return Entered(bytes((value,)) if self._place is _Place.MINE else passed)
 
     def _taken(self, value: int) -> Entered:
         if value != LF:

@@ -13,7 +13,7 @@ from detent.controllers.dcb274.pins import DIRECTION_HELD, LEAST_STEP_LOW, LEAST
 from detent.controllers.dcb274.ports import Ports
 from detent.controllers.dcb274.settings import Settings
 from detent.controllers.device import Stop
-from detent.pins import HIGH, LOW, Level
+from detent.pins import HIGH, LOW
 from detent.pulses import Train, Uniform
 from detent.ramps import timer_table
 from detent.ticks import MS, NEVER, SECOND, Ns, to_fixed
@@ -65,6 +65,7 @@ class Motion:
         self.course = Course.REST
         self.phase_origin = self._axis.shaft  # where the step sequence was at its start phase
         self.rested_at: Ns = -NEVER  # when the last motion ended
+        self._energized_at: Ns = -NEVER  # when the current has been at run for w, since it rose last
         self._origin = self._axis.shaft
         self._stopping = False  # on the way to rest, by a soft stop, M 0 or a new direction
         self._stop_later = False  # a soft stop waits for the end of a ramp
@@ -75,7 +76,8 @@ class Motion:
         self._home = 0  # the direction in which home is approached at last
         self._home_period = 0
         self._trip: int | None = None
-        self._step_fell: Ns = -NEVER
+        # since when STEP reads low; a level that nobody was seen to bring about is no edge
+        self._step_fell: Ns = NEVER
         self._stepped: Ns = -NEVER  # when the last external step was made
         self._step_due: Ns = NEVER  # when an external step is made, if its direction is held until then
         self._step_direction = 1
@@ -180,7 +182,10 @@ class Motion:
             self._begin_velocity(period, Course.VELOCITY, now)
 
     def home(self, count: int, direction: int, now: Ns) -> None:
-        """F, at rest. The low edge is looked for in `direction`, the high edge the other way."""
+        """F, at rest. The low edge is looked for in `direction`, the high edge the other way.
+
+        A soft stop ends it, whatever the switch does while the axis comes to rest (page 28).
+        """
         self._home = -direction
         self._home_period = max(count, self._settings.initial) * self._settings.divide
         if self._ports.active("HOME"):
@@ -211,12 +216,18 @@ class Motion:
     # -- stopping ----------------------------------------------------------------------------------------
 
     def soft_stop(self, now: Ns) -> None:
-        """Decelerate by K to the initial speed and stop; the pulse that is on its way keeps its time."""
+        """Decelerate by K to the initial speed and stop; the pulse that is on its way keeps its time.
+
+        A motion that waits for its current (w) has made no step, and makes none.
+        """
+        self._step_due = NEVER
         train = self._axis.train
         if train is None:
             return
         self._reversed = None
-        if self._stopping:
+        if self._energizing(now):
+            self.halt(now)
+        if self._stopping or self.at_rest:
             return
         given = self._axis.given(now)
         if self.course is Course.INDEX and given >= self._down_from:
@@ -233,25 +244,39 @@ class Motion:
         self._remark(now)
 
     def soft_stop_after_ramp(self, now: Ns) -> None:
-        """A soft stop between two M: the ramp of the first is completed before (page 28)."""
-        if self.course is Course.VELOCITY and self.completing(now):
+        """A soft stop between two M: the ramp under way is completed before (page 28).
+
+        The first ramp of a reversal ends at rest, and there the axis stays.
+        """
+        ramping = self.course is Course.VELOCITY and not self._stopping and self._axis.given(now) < self._ramp_end
+        if ramping and not self._energizing(now):
             self._stop_later = True
         else:
             self.soft_stop(now)
 
     def halt(self, now: Ns) -> None:
-        """ESC, a limit: the pulses stop at once."""
+        """ESC, a limit: the pulses stop at once, and no step from outside is still to come."""
+        self._step_due = NEVER
         if self._axis.moving:
             self._axis.cut(now)
         self._finish(now)
 
     # -- inputs ------------------------------------------------------------------------------------------
 
-    def input_changed(self, pin: str, level: Level, now: Ns) -> News:
+    def input_changed(self, pin: str, now: Ns) -> News:
         """A switch or the step inputs have a new level, which `Ports` knows already."""
         if pin in ("STEP", "DIR"):
-            return self._step_input(pin, level, now)
+            return self._step_input(pin, now)
         return self.switches_changed(now)
+
+    def options_changed(self, now: Ns) -> None:
+        """Inputs may read otherwise than before, without an edge."""
+        self.step_found(now)
+        self.switches_changed(now)
+
+    def step_found(self, now: Ns) -> None:
+        """STEP is driven, and has the level that it has: low, it may rise."""
+        self._step_fell = now if self._ports.reads("STEP") == LOW else NEVER
 
     def switches_changed(self, now: Ns) -> News:
         """Limits and home may have changed, by a level or by an option."""
@@ -263,31 +288,35 @@ class Motion:
             else:
                 self.halt(now)
             return ENDED if self.at_rest else NOTHING
+        if self._stopping:
+            return NOTHING  # "after velocity deceleration, the process is terminated" (page 28): of F as well
         low = self._ports.active("HOME")
         if self.course is Course.SEEK_LOW and low:
             self._axis.cut(now)
-            self.course = Course.REST
+            self.rested_at = now  # so the current is at run, and w is not waited for again (page 51)
             self._approach_home(self._home_period, now)
         elif self.course is Course.SEEK_HIGH and not low:
             self.halt(now)
         return ENDED if self.at_rest else NOTHING
 
-    def cuts(self) -> list[Stop]:
+    def cuts(self, now: Ns) -> list[Stop]:
         """The levels of limits and home at which `switches_changed` stops the pulses at once."""
         if not self._axis.stepping:
             return []
         levels, found = self._ports.levels, []
         for pin in ("LIMIT-A", "LIMIT-B", "HOME"):
             levels[pin] ^= 1
-            if self._cuts_now():
+            if self._cuts_now(now):
                 found.append(Stop(pin, levels[pin]))
             levels[pin] ^= 1
         return found
 
-    def _cuts_now(self) -> bool:
+    def _cuts_now(self, now: Ns) -> bool:
         """Whether the switches, as they are, end the motion under way without a ramp."""
         if self._ports.limit(self._axis.direction):
-            return not self._settings.flags & settings.GENTLE
+            return not self._settings.flags & settings.GENTLE or self._energizing(now)
+        if self._stopping:
+            return False
         low = self._ports.active("HOME")
         return (self.course is Course.SEEK_LOW and low) or (self.course is Course.SEEK_HIGH and not low)
 
@@ -312,7 +341,9 @@ class Motion:
     # -- inside ------------------------------------------------------------------------------------------
 
     def _start(self, train: Train, direction: int, now: Ns) -> None:
-        start = to_fixed(now + self._pre_energize(now))
+        if now >= self.rested_at + SETTLING:  # the current has fallen to hold, and rises now (page 51)
+            self._energized_at = now + self._settings.pre_energize * 10 * MS
+        start = to_fixed(max(now, self._energized_at))
         self._stopping = False
         self.step_period = NEVER
         self._ports.moving(True, direction, now)
@@ -320,10 +351,10 @@ class Motion:
         self._axis.start(train.at(start), direction, (), now)
         self._remark(now)
 
-    def _pre_energize(self, now: Ns) -> Ns:
-        """w, if the current has fallen to hold (page 51)."""
-        fallen = now >= self.rested_at + SETTLING
-        return self._settings.pre_energize * 10 * MS if fallen else 0
+    def _energizing(self, now: Ns) -> bool:
+        """Whether a motion has begun that waits for its current (w, page 51)."""
+        train = self._axis.train
+        return train is not None and to_fixed(now) < train.start
 
     def _run(self, period: int, now: Ns) -> None:
         """Start from rest towards a constant period, in ticks with its sign."""
@@ -386,26 +417,28 @@ class Motion:
             marks.append(given + (away or COUNTS))
         self._axis.remark(tuple(sorted({mark for mark in marks if mark > 0})), now)
 
-    def _step_input(self, pin: str, level: Level, now: Ns) -> News:
+    def _step_input(self, pin: str, now: Ns) -> News:
         """A step from outside: a rising edge, or with the encoder option an edge of A or B (page 10).
 
         A rising edge makes its step when its direction has been held for 10 us, and none when it has not.
         """
-        a, b = self._ports.levels["STEP"], self._ports.levels["DIR"]
+        a, b = self._ports.reads("STEP"), self._ports.reads("DIR")
         if self._encoder:
             # A leads B in plus direction: A equals B behind an edge of B, and differs behind one of A
             direction, due = 1 if (a != b) is (pin == "STEP") else -1, now
         elif pin == "DIR":
             self._step_due = NEVER
             return NOTHING
-        elif level == LOW:
+        elif a == LOW:
             self._step_fell = now
             return NOTHING
-        elif now - self._step_fell < LEAST_STEP_LOW:
-            return NOTHING
         else:
+            low, self._step_fell = now - self._step_fell, NEVER
+            if low < LEAST_STEP_LOW:
+                return NOTHING
             direction, due = 1 if b == HIGH else -1, now + DIRECTION_HELD
-        if self._step_due < NEVER or due - self._stepped < LEAST_STEP_PERIOD or not self.at_rest:
+        # the last step may have been the axis's own: then it has been at rest since
+        if self._step_due < NEVER or due - self.rested_at < LEAST_STEP_PERIOD or not self.at_rest:
             return NOTHING
         self._step_direction = direction
         if due == now:
@@ -420,6 +453,7 @@ class Motion:
             return NOTHING
         self.step_period, self._stepped = now - self._stepped, now
         self._axis.every_pulse = False
+        self._ports.turn(self._step_direction, now)
         self._axis.start(Train((Uniform(0, 1, 1, 1),), to_fixed(now - 1)), self._step_direction, (), now)
         self._axis.advance(now)
         if self._ports.pulses_are_wired:

@@ -1,7 +1,7 @@
 """Inputs as the firmware reads them, and what the outputs P4 and P5 show (pages 34 to 46).
 
-An input is active when it is low; flag 8 of `l` inverts every input, flag 1 the limits besides. An output that is
-on pulls its pin to 0.
+An input is active when it is low. Flag 8 of `l` inverts every input but the limits, flag 1 the limits (page 8: "'l 9'
+will invert all of the inputs", "'l 8' all but the limit switch inputs"). An output that is on pulls its pin to 0.
 """
 
 from detent.controllers.dcb274 import settings
@@ -40,11 +40,19 @@ class Ports:
     # -- inputs ------------------------------------------------------------------------------------------
 
     def active(self, pin: str) -> bool:
-        """Whether an input is active: low, or high with flag 8; a limit the other way round with flag 1."""
-        inverted = bool(self._settings.flags & settings.PLC)
-        if pin.startswith("LIMIT") and self._settings.flags & settings.INVERT_LIMITS:
-            inverted = not inverted
-        return (self.levels[pin] == LOW) is not inverted
+        """Whether an input is active: low, or high where its flag inverts it."""
+        return self.reads(pin) == LOW
+
+    def reads(self, pin: str) -> Level:
+        """The level of an input as the firmware has it, inverted where an option says so; STEP and DIR as well."""
+        flag = settings.INVERT_LIMITS if pin.startswith("LIMIT") else settings.PLC
+        level = self.levels[pin]
+        return (HIGH if level == LOW else LOW) if self._settings.flags & flag else level
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the soft stop input is active: then nothing sets off."""
+        return self.active("SS")
 
     def limit(self, direction: int) -> bool:
         """Whether motion in `direction` is inhibited: A stops +, B stops -."""
@@ -84,12 +92,19 @@ class Ports:
     def moving(self, is_moving: bool, direction: int, now: Ns) -> None:
         """The axis starts in a direction, or has stopped."""
         self._moving = is_moving
-        if is_moving and direction != self._direction:
+        if is_moving:
+            self.turn(direction, now)
+        self.show(now)
+
+    def turn(self, direction: int, now: Ns) -> None:
+        """The steps that follow are in this direction, whoever asks for them."""
+        if direction != self._direction:
             self._direction = direction
             if self._settings.flags & settings.STEP_OUT:
                 # the slave needs its direction for 10 us behind the rising edge (page 10)
-                self._turns = max(now, self._last_pulse + STEP_LOW + DIRECTION_HOLD)
-        self.show(now)
+                held = self._last_pulse + STEP_LOW + DIRECTION_HOLD
+                self._turns = held if held > now else NEVER
+            self.show(now)
 
     def pulse(self, now: Ns) -> None:
         """A step is made, and somebody listens."""

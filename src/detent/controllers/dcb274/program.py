@@ -58,8 +58,6 @@ def decode(data: bytes) -> Instruction | None:
     values: list[int] = []
     for argument in row.arguments:
         value = argument.unpack(rest[: argument.width])
-        if row.op is Op.TERMINATE and rest[0] == 0:
-            value = 0
         if value is None:
             return None
         values.append(value)

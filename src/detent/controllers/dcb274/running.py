@@ -27,7 +27,11 @@ class Stage(Enum):
     MOTION = "W: waiting for the motion"
     WAIT = "W: waiting for its time"  # until `timer`
     PORT = "L 2048: waiting for a port"
+    PRINT = "printing"  # until `timer`
     LAST = "waiting for the last motion"
+
+
+_WAITS = (Stage.HELD, Stage.MOTION, Stage.WAIT, Stage.PORT, Stage.LAST)
 
 
 class _Saved(NamedTuple):
@@ -58,7 +62,7 @@ class Running:
         self._instruction: Instruction | None = None
         self._left: int | None = None  # rounds that the jump counter still has; None: idle
         self._saved: _Saved | None = None  # in the trip routine
-        self._called = 0  # the vector of a trip that waits for the end of an instruction
+        self._called = 0  # the vector of a trip that waits: for the end of an instruction, or of the trip routine
         self._stopping = False  # a soft stop was asked for
 
     @property
@@ -85,13 +89,15 @@ class Running:
         self._stopping, self._saved, self._called = True, None, 0
 
     def trip(self, vector: int, now: Ns) -> None:
-        """The trip position is reached: call the routine, between instructions or in a wait."""
-        if not self.active or self._saved is not None or self._stopping:
-            return
-        if self.stage in (Stage.HELD, Stage.MOTION, Stage.WAIT, Stage.PORT, Stage.LAST):
-            self._call(vector, now)
-        else:
+        """The trip position is reached: call the routine, between two instructions or in a wait (page 49).
+
+        While an instruction is fetched or executed that is when it is done, or begins to wait; while the routine
+        runs, when that has returned ("the new trip cannot be triggered until the end of the first trip routine").
+        """
+        if self.active and not self._stopping:
             self._called = vector
+            if self.stage in _WAITS:
+                self._serve(now)
 
     def advance(self, at: Ns) -> None:
         """Deal with the deadline `at`."""
@@ -103,6 +109,8 @@ class Running:
                 self._execute(at)
             case Stage.WAIT:
                 self._next(at)
+            case Stage.PRINT:
+                self._go_on(at)
 
     def poll(self, now: Ns) -> None:
         """Look whether what the program waits for has come."""
@@ -146,7 +154,7 @@ class Running:
         if self._ready(instruction, now):
             self._begin(printed)
         else:
-            self.stage = Stage.HELD
+            self._wait(Stage.HELD, now)
 
     def _ready(self, instruction: Instruction, now: Ns) -> bool:
         """As for typed commands; and O behind F waits for home, as the program on page 47 has it."""
@@ -165,8 +173,7 @@ class Running:
         work, values = self._work, instruction.values
         match instruction.op:
             case Op.WAIT:
-                self.stage = Stage.MOTION
-                self.poll(now)
+                self._wait(Stage.MOTION, now)
             case Op.GO:
                 self.trace = bool(values[1])
                 self._left = None
@@ -183,9 +190,9 @@ class Running:
                 if self._port_met():
                     self._next(now)
                 elif values[0] == BRANCH:
-                    self.stage = Stage.PORT
+                    self._wait(Stage.PORT, now)
                 else:
-                    self._jump(values[0], now)
+                    self._jump(values[0], now, fetched=values[0] == self.address)
             case Op.NEXT_TRIP | Op.RESTART_TRIP:
                 work.trip.special(instruction, _FIRST_SPECIAL, now)
                 self._next(now)
@@ -203,46 +210,64 @@ class Running:
             text = self._work.obey(instruction, now, named=False)
         except commands.Refusal:
             text = "#"
-        self._next(self._say(text, now) if text else now)
+        self._next(now, self._say(text, now) if text else now)
 
-    def _jump(self, address: int, now: Ns) -> None:
+    def _jump(self, address: int, now: Ns, *, fetched: bool = False) -> None:
         self.address = address
-        self._go_on(now)
+        self._go_on(now, fetched=fetched)
 
-    def _next(self, now: Ns) -> None:
+    def _next(self, now: Ns, printed: Ns = 0) -> None:
+        """On to the instruction behind this one, when what it prints has been `printed`."""
         assert self._instruction is not None
         self.address += ROWS[self._instruction.op].length
-        self._go_on(now)
+        if printed > now:
+            self.stage, self.timer = Stage.PRINT, printed
+        else:
+            self._go_on(now)
 
-    def _go_on(self, now: Ns) -> None:
-        """Between two instructions: a trip that came meanwhile is served."""
-        if self._called:
-            self.stage = Stage.FETCH
-            self._instruction, self.timer = None, NEVER
-            self._call(self._called, now)
+    def _go_on(self, now: Ns, *, fetched: bool = False) -> None:
+        """Between two instructions: a trip that came meanwhile is served.
+
+        An L that jumps to itself is in hand (`fetched`): it tests every 2 to 3 ms wherever it stands (page 44).
+        """
+        self.stage, self.timer = Stage.FETCH, NEVER
+        if self._serve(now):
+            return
+        if fetched:
+            self._fetched(now)
         else:
             self._fetch(now)
 
-    def _call(self, vector: int, now: Ns) -> None:
+    def _wait(self, stage: Stage, now: Ns) -> None:
+        """A wait begins: a trip that came meanwhile is served."""
+        self.stage = stage
+        if not self._serve(now):
+            self.poll(now)
+
+    def _serve(self, now: Ns) -> bool:
+        """Call the trip routine, if a trip waits for that and the routine does not run already."""
+        if not self._called or self._saved is not None:
+            return False
         self._saved = _Saved(self.stage, self.address, self._instruction, self.timer)
-        self._called = 0
-        self.address = vector
+        self.address, self._called = self._called, 0
         self._fetch(now)
+        return True
 
     def _end(self, now: Ns) -> None:
         """FFh: back from the trip routine, or the end of the program."""
         saved, self._saved = self._saved, None
         if saved is None:
-            self.stage = Stage.LAST
-            self.poll(now)
-        elif saved.stage is Stage.FETCH:
-            self.address = saved.address
+            self._wait(Stage.LAST, now)
+            return
+        self.stage, self.address, self._instruction, self.timer = saved
+        if self._serve(now):
+            return
+        if self.stage is Stage.FETCH:
             self._fetch(now)
-        else:
-            self.stage, self.address, self._instruction, self.timer = saved
-            if self.stage is Stage.WAIT:
-                self.timer = max(self.timer, now)
-            self.poll(now)
+            return
+        if self.stage is Stage.WAIT:
+            self.timer = max(self.timer, now)
+        self.poll(now)
 
     def _port_met(self) -> bool:
         """Whether the condition of L is met: 2 (port - 1) for low, that is active, 1 more for high."""

@@ -1,12 +1,13 @@
 """The working registers, and where they lie in NV memory (page 31).
 
 (E) Cells that the manual does not give: the vector of T at 224, b and w at 225 and 226, Y at 248 and 249, the mode
-of Z at 250. A register that NV memory holds out of its range is limited to it.
+of Z at 250. A register that NV memory holds out of its range is limited to it; a name that is none is A.
 """
 
 from collections.abc import Mapping
 from typing import Final
 
+from detent.controllers.dcb274.link import FACTORY_NAME, is_name
 from detent.controllers.dcb274.memory import Memory
 from detent.ramps.timer_table import LEAST_COUNT, SLOWEST, TABLE, Speeds, count_of, rate_of
 
@@ -25,7 +26,7 @@ SPECIAL: Final = 0xFF  # in the cell of T's vector: the special trip of k is arm
 
 _VECTOR, _DECAY, _PRE_ENERGIZE, _OPTIONS, _DIVIDE = 224, 225, 226, 227, 229
 _INITIAL, _SLEW, _JOG, _RAMP, _TRIP, _TRIP_DATA = 230, 234, 238, 240, 242, 245
-_RESOLUTION, NAME, _CURRENT, _READOUT = 246, 247, 248, 250
+_RESOLUTION, NAME, _CURRENT, READOUT = 246, 247, 248, 250
 _LARGEST_COUNT: Final = count_of(SLOWEST)
 
 
@@ -78,7 +79,7 @@ class Settings:
             _JOG: self.jog[0], _JOG + 1: self.jog[1], _RAMP: self.ramp[0], _RAMP + 1: self.ramp[1],
             **{_TRIP + i: value for i, value in enumerate(position)}, _TRIP_DATA: self.trip_data,
             _RESOLUTION: self.resolution, NAME: self.name,
-            _CURRENT: self.current[0], _CURRENT + 1: self.current[1], _READOUT: self.readout,
+            _CURRENT: self.current[0], _CURRENT + 1: self.current[1], READOUT: self.readout,
         }  # fmt: skip
 
     def registers(self) -> dict[str, str]:
@@ -86,7 +87,7 @@ class Settings:
         up, down = self.ramp
         return {
             "I": str(rate_of(self.initial)), "V": str(rate_of(self.slew)), "K": f"{up}/{down}", "D": str(self.divide),
-            "H": RESOLUTION_NAMES[self.resolution], "b": str(self.decay), "l": str(self.options),
+            "H": RESOLUTION_NAMES[self.resolution], "b": str(self.decay), "l": str(self.flags),
             "T": str(self.trip), "Y": f"{self.current[0]}/{self.current[1]} %", "n": chr(self.name),
         }  # fmt: skip
 
@@ -103,24 +104,24 @@ class Settings:
         self.plc_for_now = False
         self.resolution = min(nv[_RESOLUTION], len(RESOLUTION) - 1)
         self.current = min(nv[_CURRENT], 100), min(nv[_CURRENT + 1], 100)
-        self.readout = nv[_READOUT] & 1
+        self.readout = nv[READOUT] & 1
         self.trip = int.from_bytes(nv[_TRIP : _TRIP + 3], "little", signed=True)
         self.trip_data = nv[_TRIP_DATA]
         vector = nv[_VECTOR]
         self.trip_vector = vector if vector <= 192 or vector == SPECIAL else 0
-        self.name = nv[NAME]
+        self.name = nv[NAME] if is_name(nv[NAME]) else FACTORY_NAME
 
     def shown(self, slow: bool) -> str:
         """The line of X behind its echo (page 22)."""
         up, down = self.ramp
-        special = f"l={self.options}, " if self.options else ""
+        special = f"l={self.flags}, " if self.flags else ""
         return (
             f" K= {up}/{down}, I= {rate_of(self.initial)}, V= {rate_of(self.slew)}, D= {self.divide}, b={self.decay}, "
             f"{'s' if slow else 'f'}, {RESOLUTION_NAMES[self.resolution]}, {special}n={chr(self.name)}"
         )
 
 
-def factory(name: str) -> Mapping[int, int]:
+def factory(name: str = chr(FACTORY_NAME)) -> Mapping[int, int]:
     """The parameter cells as they leave the factory; C 1 writes those below 247."""
     return Settings(name).cells()
 

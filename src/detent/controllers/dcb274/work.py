@@ -21,6 +21,10 @@ MODEL_NUMBER: Final = 26  # what X answers in party line (page 52)
 READ_PORTS: Final = 129
 AT_LEAST: Ns = 10 * US  # an instruction without execution times; no loop takes no time
 _INDEXES: Final = (Op.PLUS, Op.MINUS, Op.INDEX_TO, Op.FIND_HOME)
+_SETS_OFF: Final = (*_INDEXES, Op.VELOCITY, Op.GO)
+
+
+_STOP: Final = Instruction(Op.VELOCITY, (0,))
 
 
 def byte(value: int) -> str:
@@ -59,6 +63,10 @@ class Work:
         if not self._times:
             return AT_LEAST
         return COMMON + ROWS[Op.WRITE_MEMORY].time * self.memory.nv_bytes(address, length)
+
+    def moves(self, instruction: Instruction) -> bool:
+        """Whether an instruction sets the axis in motion, or a program going; M 0 stops."""
+        return instruction.op in _SETS_OFF and instruction != _STOP
 
     def ready(self, instruction: Instruction, now: Ns) -> bool:
         """Whether an instruction may execute now.
@@ -160,7 +168,7 @@ class Work:
             raise Refusal(f"l {flags}: of the options 2, 4 and 16 only one at a time")
         self.settings.options, self.settings.plc_for_now = flags, False
         self.ports.show(now)
-        self.motion.switches_changed(now)
+        self.motion.options_changed(now)
         return ""
 
     def _retired(self, value: int, *, now: Ns, named: bool) -> str:
