@@ -53,6 +53,7 @@ def _checked(read: Callable[[str], bool]) -> Callable[[str], bool]:
 _HOST_RATES = (1200, 2400, 4800, 9600, 19_200, 38_400, 57_600, 115_200)
 _AXIS_RATES = (9600, 19_200, 38_400, 460_800)
 _SWITCH = Option("switch", "party", _checked(_switch), "party or single", "party", "the switch when the cell starts")
+_OFF = _SWITCH._replace(default="single")  # "all (8) switches in off position" (manual of the DCB-274, page 4)
 
 PARTS: dict[str, Part] = {
     "step-detector": Part(
@@ -92,7 +93,7 @@ PARTS: dict[str, Part] = {
                 "9600",
                 "rate of the party line",
             ),
-            _SWITCH,
+            _OFF,
             Option(
                 "mode",
                 "converter",

@@ -13,12 +13,14 @@ from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind
 from detent.ticks import MS, NEVER, Ns
 from detent.uart import Char, Format, SerialPort, Transmitter
 
-LF, CR, ESC = 0x0A, 0x0D, 0x1B
+LF, CR, ESC, SPACE = 0x0A, 0x0D, 0x1B, 0x20
 CTRL_C, CTRL_P = 0x03, 0x10
 BUFFER: Final = 256  # characters, each way
 NAMES: Final = bytes(value for value in range(0x21, 0x7F) if value not in b"[\\]^_`@")
 PATIENCE: Final[Ns] = 2 * MS  # for an echo, beside four characters
+EXECUTING: Final[Ns] = 20 * MS  # as long as most commands take (page 29 of the manual), and a stop waits for its echo
 RESTART: Final[Ns] = 5 * MS  # from ^P to the scan
+LOST: Final = b"\0\r"  # stands in the buffer for what the line had beyond that: NUL is no name
 _ROOM: Final = 128  # characters that may wait for the host before another command begins
 
 PINS = (
@@ -134,6 +136,7 @@ class Task(Enum):
     COMMAND = "command"
     POLL = "is it moving"
     SCAN = "is there an axis of this name"
+    STOP = "one axis is to stop"
     RESTART = "after ^P"
     ABORT = "after ESC"
 
@@ -151,21 +154,30 @@ class Sin10(Adapter):
 
     Line of commands separated by ``;``, ended by CR or LF; each is answered with one line. `&` first: it restarts
     the axes in party line mode and answers their names. ``9W*`` and ``9Wn`` wait until all axes or one stand
-    still. ESC and ^C go through at once, and end everything; ESC is answered ``#``.
+    still. ESC and ^C go through at once, and end everything; ESC is answered ``#``. A line that is ``n@`` or ``n|``
+    stops one axis (pages 33, 57): it waits for nothing that the adapter itself waits for.
+
+    With its switch off, as it comes (page 4: "all (8) switches in off position"), and before it has looked for axes,
+    SPACE makes it a plain converter, and signs one axis on; a character before that is its name (page 23). So it
+    stays until `&`, ^C or power-off: "selectable via host commands or a built in mode switch" (page 20).
     """
 
     def __init__(
-        self, baud: int = 9600, line_baud: int = 9600, party: bool = True, converter: bool = False, *,
+        self, baud: int = 9600, line_baud: int = 9600, party: bool = False, converter: bool = False, *,
         line_timing: bool = True,
     ) -> None:  # fmt: skip
         super().__init__(baud, line_baud, party, line_timing)
         self._converter = converter  # "the SIN-10 can be one"
+        self._through = converter  # characters go through as they are
         self.names = b""  # of the axes that the scan has found
         self._forget()
 
     def _forget(self) -> None:
         self._buffer = bytearray()  # from the host, as far as it has not been begun
         self._lines = 0  # complete ones in it
+        self._lost = False  # the line that comes is longer than what the buffer has left
+        self._stops: deque[bytes] = deque()  # lines that stop an axis, to be sent as soon as may be
+        self._held: tuple[Task, bytes] | None = None  # what a stop has come before: task, and the reply so far
         self._task, self._waiting = Task.NONE, Waiting.NOTHING
         self._to_send: deque[int] = deque()  # to the axis
         self._expected = 0  # the echo
@@ -179,7 +191,13 @@ class Sin10(Adapter):
     def power(self, on: bool, now: Ns) -> None:
         """Switch the supply."""
         super().power(on, now)
-        self.names = b""
+        self._restart()
+
+    def _restart(self) -> None:
+        """Power-on and ^C. With the switch off the axes are in single mode behind it, and none is known."""
+        self._through = self._converter
+        if self._party == LOW:
+            self.names = b""
         self._forget()
 
     def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
@@ -192,6 +210,8 @@ class Sin10(Adapter):
             if self._powered:
                 if port == UPSTREAM.receives:
                     self._from_host(char.value, now)
+                elif self._through:
+                    self._up.send(bytes((char.value,)), now)
                 else:
                     self._from_axis(char.value, now)
                 self.advance(now)
@@ -229,6 +249,14 @@ class Sin10(Adapter):
     # -- from the host -----------------------------------------------------------------------------------
 
     def _from_host(self, value: int, now: Ns) -> None:
+        if value == SPACE and self._signs_on:
+            self._through = True
+            self._down.send(bytes(self._buffer), now)
+            self._buffer.clear()
+        if self._through and value not in (CTRL_C, ord("&")):
+            self._down.send(bytes((value,)), now)
+            return
+        self._through = False
         if value in (ESC, CTRL_C):
             self._forget()
             self._up.discard()
@@ -237,20 +265,68 @@ class Sin10(Adapter):
             if value == ESC:
                 self._task = Task.ABORT
                 self._wait_for_echo(now)
+            else:
+                self._restart()
         elif value in (CR, LF):
-            if self._buffer and self._buffer[-1] != CR:
-                self._buffer.append(CR)
-                self._lines += 1
-                self._look(now)
-        elif len(self._buffer) < BUFFER:
+            self._line_ends(now)
+        elif self._lost or len(self._buffer) >= BUFFER:
+            self._lost = True
+        else:
             self._buffer.append(value)
+
+    @property
+    def _signs_on(self) -> bool:
+        """Whether SPACE is for an axis in single mode: nothing else has been said, but perhaps its name."""
+        return self._party == LOW and not self.names and not self._busy and len(self._buffer) <= 1
+
+    def _line_ends(self, now: Ns) -> None:
+        """A line is whole. A stop goes first; a command of which a part was lost is not done, but answered ``#``."""
+        start = self._buffer.rfind(CR) + 1
+        line = bytes(self._buffer[start:])
+        if self._lost:
+            self._lost = False
+            if not line and self._buffer[-2:] == LOST:
+                return  # several lines in a row are one: the buffer has an end
+            del self._buffer[max(start, self._buffer.rfind(b";") + 1) :]
+            self._buffer += LOST
+        elif not line:
+            return
+        elif len(line) == 2 and line[1] in b"@|" and self._known(chr(line[0])) and self._busy:
+            del self._buffer[start:]
+            if line not in self._stops:
+                self._stops.append(line)
+            self._cut_in(now)
+            return
+        else:
+            self._buffer.append(CR)
+        self._lines += 1
+        self._look(now)
+
+    @property
+    def _busy(self) -> bool:
+        return self._task is not Task.NONE or self._lines > 0
+
+    def _cut_in(self, now: Ns) -> None:
+        """A stop waits: nothing is under way, or a command waits in its axis; a poll is over soon."""
+        if self._stops and (self._task is Task.NONE or (self._task is Task.COMMAND and self._waits_for_axis)):
+            if self._task is Task.COMMAND:
+                self._held = self._task, bytes(self._reply)
+            self._exchange(Task.STOP, self._stops.popleft(), now)
+
+    @property
+    def _waits_for_axis(self) -> bool:
+        """Whether a whole command was sent, and its end is the axis' matter."""
+        return self._waiting is Waiting.END and not self._silent
 
     def _look(self, now: Ns) -> None:
         """Begin the next command as soon as the host's line has room for its answer."""
+        self._cut_in(now)
         if self._task is Task.NONE and self._lines:
             self._begin_at = max(now, self._up.busy_until - self.line_format.duration(_ROOM) if self._timed else now)
 
     def _begin(self, now: Ns) -> None:
+        if self._task is not Task.NONE:
+            return  # a stop came before
         end = next(i for i, value in enumerate(self._buffer) if value in b";\r")
         command, separator = self._buffer[:end].decode("latin-1").strip(" "), self._buffer[end]
         del self._buffer[: end + 1]
@@ -300,18 +376,25 @@ class Sin10(Adapter):
 
     def _wait_for_echo(self, now: Ns) -> None:
         characters = self.downstream_format.duration(4) if self._timed else 0
-        self._timer = now + characters + PATIENCE
+        # the axis that is to stop may just execute what came before
+        self._timer = now + characters + (EXECUTING if self._task is Task.STOP else PATIENCE)
 
     def _from_axis(self, value: int, now: Ns) -> None:
-        match self._waiting:
-            case Waiting.ECHO if value == self._expected:
-                self._timer = NEVER
-                self._reply.append(value)
-                self._send_next(now)
-            case Waiting.END if value == LF:
+        if self._waiting is Waiting.ECHO and value == self._expected:
+            self._timer = NEVER
+            self._reply.append(value)
+            self._send_next(now)
+        elif self._held is not None and self._held[0] is Task.COMMAND:  # the end of the command that is stopped
+            if value == LF:
+                self._up.send(self._held[1] + b"\r\n", now)
+                self._held = None
+            else:
+                self._held = self._held[0], self._held[1] + bytes((value,))
+        elif self._waiting is Waiting.END:
+            if value == LF:
                 self._timer = NEVER
                 self._done(now)
-            case Waiting.END:
+            else:
                 self._reply.append(value)
 
     def _no_echo(self, now: Ns) -> None:
@@ -334,7 +417,10 @@ class Sin10(Adapter):
         self._waiting = Waiting.NOTHING
         match self._task:
             case Task.COMMAND:
-                self._answer(self._reply.decode("latin-1") + ("?" if self._silent and not self._reply else ""), now)
+                self._answer(self._said(), now)
+            case Task.STOP:
+                self._up.send(self._said().encode("latin-1") + b"\r\n", now)
+                self._go_on(now)
             case Task.SCAN:
                 if self._reply:
                     self.names += bytes((self._axes[0],))
@@ -344,7 +430,29 @@ class Sin10(Adapter):
                 status = self._reply[2:].strip()
                 if not self._silent and status.isdigit() and int(status) & 3 == 0:
                     self._axes.popleft()
-                self._poll(now)
+                if self._stops:
+                    self._held = Task.POLL, b""
+                    self._exchange(Task.STOP, self._stops.popleft(), now)
+                else:
+                    self._poll(now)
+
+    def _said(self) -> str:
+        """What the axis said: the echo and its answer; ``?`` if it did not even echo what stands behind its name."""
+        if self._silent and len(self._reply) < 2:
+            return "?"
+        return self._reply.decode("latin-1") + ("?" if self._silent else "")
+
+    def _go_on(self, now: Ns) -> None:
+        """Behind a stop: with what it came before."""
+        held, self._held = self._held, None
+        if held is None:
+            self._task, self._waiting = Task.NONE, Waiting.NOTHING
+            self._look(now)
+        elif held[0] is Task.POLL:
+            self._poll(now)
+        else:  # the axis did not take the stop, and still owes the end of its command
+            self._task, self._waiting, self._silent = Task.COMMAND, Waiting.END, False
+            self._reply = bytearray(held[1])
 
     def _scan(self, now: Ns) -> None:
         if self._axes:

@@ -112,7 +112,7 @@ def stop(bench: Bench, how: str) -> None:
 
 
 def longest_stop(bench: Bench) -> Ns:
-    """The pulse on its way, a ramp to speed that is completed before (page 28), a ramp to rest, and commands in hand."""
+    """A pulse on its way, a ramp to speed that is completed before (page 28), a ramp to rest, commands in hand."""
     registers = bench.unit._settings
     ramp = sum(ladder(registers.initial, registers.divide).periods) * TICK
     pulse = max(bench.unit._motion.period(bench.now), count_of(40)) * TICK * 2

@@ -276,8 +276,26 @@ class Dcb274:
         return Status(motion.position(now), self._axis.pulses_at(now), state)
 
     def cuts(self, now: Ns, axis: str = "") -> Sequence[Stop]:
-        """The limit ahead unless it is gentle (l 32), and the home switch while it is looked for."""
-        return self._motion.cuts(now) if self._powered else ()
+        """The limit ahead unless it is gentle (l 32), and the home switch while it is looked for.
+
+        While w runs no step has been made, and the soft stop input and the end of a jog prevent them all.
+        """
+        if not self._powered:
+            return ()
+        found, levels = self._motion.cuts(now), self._ports.levels
+        if self._motion.energizing(now):
+            for pin in ("SS", "JOG1", "JOG2", "JOG-S"):
+                levels[pin] ^= 1
+                if self._stops_now():
+                    found.append(Stop(pin, levels[pin]))
+                levels[pin] ^= 1
+        return found
+
+    def _stops_now(self) -> bool:
+        """Whether the soft stop and jog inputs, as they are, ask for a stop."""
+        if self._ports.stopped and not self._stopped:
+            return True
+        return self._motion.jogging and self._motion.jog_ends(self._wanted(), self._ports.active("JOG-S"))
 
     def switches(self, axis: str = "") -> Sequence[str]:
         """Both limits and home."""
@@ -552,7 +570,7 @@ class Dcb274:
         desk, motion, ports = self._desk, self._motion, self._ports
         if self._spent:
             self._spent = {pin for pin in self._spent if ports.active(pin)}
-        wanted = 0 if ports.stopped else self._asks("JOG1") - self._asks("JOG2")
+        wanted = self._wanted()
         if motion.jogging:  # its release is heeded whatever else is going on
             motion.jog(wanted, ports.active("JOG-S"), now)
             return
@@ -563,6 +581,10 @@ class Dcb274:
             self._running.go(0, False, now)
         elif motion.at_rest and wanted:
             motion.jog(wanted, ports.active("JOG-S"), now)
+
+    def _wanted(self) -> int:
+        """The direction that the jog inputs ask for; 0 is none."""
+        return 0 if self._ports.stopped else self._asks("JOG1") - self._asks("JOG2")
 
     def _read_out(self, now: Ns) -> None:
         """Z 1: print a changed position when the line is free (page 53)."""

@@ -66,6 +66,7 @@ class Motion:
         self.phase_origin = self._axis.shaft  # where the step sequence was at its start phase
         self.rested_at: Ns = -NEVER  # when the last motion ended
         self._energized_at: Ns = -NEVER  # when the current has been at run for w, since it rose last
+        self._sets_off: Ns = NEVER  # when the motion that waits for that begins
         self._origin = self._axis.shaft
         self._stopping = False  # on the way to rest, by a soft stop, M 0 or a new direction
         self._stop_later = False  # a soft stop waits for the end of a ramp
@@ -106,6 +107,10 @@ class Motion:
             return self._stopping or self._axis.given(now) < self._ramp_end
         return self.indexing
 
+    def energizing(self, now: Ns) -> bool:
+        """Whether a motion has begun that waits for its current (w, page 51)."""
+        return now < self._sets_off < NEVER
+
     @property
     def status(self) -> int:
         """What ^ prints: 0 at rest, 1 indexing or homing, 3 constant velocity or jog, ramps included."""
@@ -125,7 +130,7 @@ class Motion:
     @property
     def deadline(self) -> Ns:
         """When something happens by itself."""
-        return min(self._axis.deadline, self._ports.deadline, self._step_due)
+        return min(self._axis.deadline, self._ports.deadline, self._step_due, self._sets_off)
 
     def next_change(self, now: Ns) -> Ns:
         """When the position changes next by itself."""
@@ -196,17 +201,24 @@ class Motion:
 
     def jog(self, direction: int, fast: bool, now: Ns) -> None:
         """The jog inputs ask for this direction (0: none) and speed, at rest or while jogging."""
-        unit = self._settings.jog[fast] * JOG_UNIT * settings.RESOLUTION[self._settings.resolution]
+        unit = self._jog_speed(fast)
         period = timer_table.count_of(unit) * self._settings.divide if unit else 0
         if self.course is Course.JOG:
             if self._stopping:
                 return
-            if not unit or direction != self._axis.direction:
+            if self.jog_ends(direction, fast):
                 self.soft_stop(now)
             elif period != abs(self._target):
                 self._change(period, now)
         elif unit and direction and not self._ports.limit(direction):
             self._begin_velocity(direction * period, Course.JOG, now)
+
+    def jog_ends(self, direction: int, fast: bool) -> bool:
+        """Whether the jog under way ends, if its inputs ask for this."""
+        return not self._jog_speed(fast) or direction != self._axis.direction
+
+    def _jog_speed(self, fast: bool) -> int:
+        return self._settings.jog[fast] * JOG_UNIT * settings.RESOLUTION[self._settings.resolution]
 
     @property
     def jogging(self) -> bool:
@@ -225,7 +237,7 @@ class Motion:
         if train is None:
             return
         self._reversed = None
-        if self._energizing(now):
+        if self.energizing(now):
             self.halt(now)
         if self._stopping or self.at_rest:
             return
@@ -249,7 +261,7 @@ class Motion:
         The first ramp of a reversal ends at rest, and there the axis stays.
         """
         ramping = self.course is Course.VELOCITY and not self._stopping and self._axis.given(now) < self._ramp_end
-        if ramping and not self._energizing(now):
+        if ramping and not self.energizing(now):
             self._stop_later = True
         else:
             self.soft_stop(now)
@@ -314,7 +326,7 @@ class Motion:
     def _cuts_now(self, now: Ns) -> bool:
         """Whether the switches, as they are, end the motion under way without a ramp."""
         if self._ports.limit(self._axis.direction):
-            return not self._settings.flags & settings.GENTLE or self._energizing(now)
+            return not self._settings.flags & settings.GENTLE or self.energizing(now)
         if self._stopping:
             return False
         low = self._ports.active("HOME")
@@ -322,6 +334,9 @@ class Motion:
 
     def advance(self, at: Ns) -> News:
         """Deal with the deadline `at`; a step comes before whatever the outputs do."""
+        if self._sets_off <= at:
+            self._sets_off = NEVER
+            return NOTHING
         if self._axis.deadline > at:
             if self._step_due <= at:
                 return self._external_step(at)
@@ -344,17 +359,13 @@ class Motion:
         if now >= self.rested_at + SETTLING:  # the current has fallen to hold, and rises now (page 51)
             self._energized_at = now + self._settings.pre_energize * 10 * MS
         start = to_fixed(max(now, self._energized_at))
+        self._sets_off = self._energized_at if self._energized_at > now else NEVER
         self._stopping = False
         self.step_period = NEVER
         self._ports.moving(True, direction, now)
         self._axis.every_pulse = self._ports.pulses_are_wired
         self._axis.start(train.at(start), direction, (), now)
         self._remark(now)
-
-    def _energizing(self, now: Ns) -> bool:
-        """Whether a motion has begun that waits for its current (w, page 51)."""
-        train = self._axis.train
-        return train is not None and to_fixed(now) < train.start
 
     def _run(self, period: int, now: Ns) -> None:
         """Start from rest towards a constant period, in ticks with its sign."""
@@ -402,6 +413,7 @@ class Motion:
         if self.course is not Course.REST:
             self.rested_at = now
         self.course = Course.REST
+        self._sets_off = NEVER
         self._stopping = self._stop_later = False
         self._reversed = None
         self._ports.moving(False, self._axis.direction, now)

@@ -310,25 +310,24 @@ class Commands(Unit):
         """|: end program and motion of this axis alone at once, without a ramp (page 57). Not in single mode."""
         if self.mode == "single":
             raise ValueError("| is for lines of several axes (page 57): abort()")
-        if not (yield from self._cut_in("|")):
-            self._way.running = False
+        yield from self._cut_in("|")
+        self._way.running = False
 
-    def _cut_in(self, letter: str) -> Steps[bool]:
-        """Whatever waits for its turn is dropped, and `letter` is said: as a line (True), or to a program that runs."""
+    def _cut_in(self, letter: str) -> Steps[None]:
+        """Whatever waits for its turn is dropped, and `letter` is said: as a line, or to a program that runs."""
         self._stops += 1
         self._leave(None)
         if not self._connected:
             yield from self.connect()
-        if not self._way.running:
+        if not self._way.running and self.mode == "single":
             try:
                 yield from self._enter(letter, QUICK, 1)
-                return True
+                return
             except Deaf:
                 # A program runs that this driver did not start, or the character was lost. In single mode it may
                 # have been the interrupt already, and another does no harm.
                 self._way.running = True
         yield from self._way.interrupt(letter.encode())
-        return False
 
     @operation
     def abort(self) -> Steps[None]:

@@ -4,7 +4,7 @@ from detent.hosts.axis import Limits, Speeds
 from detent.hosts.dcb274.memory import Memory
 from detent.hosts.dcb274.ranges import FARTHEST, FASTEST, SLOWEST, ramp_seconds
 from detent.hosts.dcb274.unit import REST
-from detent.hosts.errors import DriverError, MotionFailed
+from detent.hosts.errors import MotionFailed
 from detent.hosts.exchange import Asynchronous, Blocking, Steps, operation
 
 DIVIDE_AT = 229  # in NV memory (page 31)
@@ -40,17 +40,14 @@ class Dcb274(Memory):
 
     @operation
     def halt(self) -> Steps[None]:
-        """Stop at once: by ESC in single mode, where lines have names by |, which stops this axis alone.
+        """Stop at once: by ESC in single mode, where lines have names by |, which stops this axis alone (page 57).
 
-        If that fails, by ESC all the same, which stops every axis on the line.
+        Raises DriverError if the axis does not take it; `abort` then stops every axis on the line.
         """
         if self.mode == "single":
             yield from self.abort()
-            return
-        try:
+        else:
             yield from self.terminate()
-        except DriverError:
-            yield from self.abort()
 
     @operation
     def home(self, direction: int = -1) -> Steps[None]:

@@ -67,7 +67,10 @@ class Handshake(Driver):
         yield
 
     def interrupt(self, character: bytes) -> Steps[None]:
-        """Send ``@``, or on a line with names ``|``, to a unit that takes no line: a program runs (page 28)."""
+        """Send ``@``, or on a line with names ``|``, to a unit that takes no line: a program runs (page 28).
+
+        Where lines have names it is a line like any other for the unit that runs nothing, and means the same.
+        """
         raise NotImplementedError
         yield
 
@@ -184,11 +187,17 @@ class SingleMode(Handshake):
         return True
 
     def escape(self) -> Steps[None]:
-        """ESC is answered by one ``#``; before sign-on by nothing."""
-        answer = yield Ask(ESC, until(b"#"), self.patience)
-        if not answer.whole:
-            what = "does not answer ESC: it waits for its sign-on, is on a party line, or is off"
-            raise NoAnswer(self.title, what, Spoken(ESC, answer.data))
+        """ESC is answered by ``#`` CR LF (page 33), of other firmware perhaps by ``#`` alone.
+
+        Before sign-on it is obeyed and answered by nothing: then SPACE shows that somebody is there.
+        """
+        answer = yield Ask(ESC, until(b"#\r\n"), self.patience)
+        if answer.whole or answer.data.endswith(b"#"):
+            return
+        signed = yield Ask(SPACE, until(b"\r\n"), self.patience)
+        if not (signed.whole and re.search(rb"V\d+\.\d+", signed.data)):
+            what = "answers neither ESC nor SPACE: it is on a party line, or is off"
+            raise NoAnswer(self.title, what, Spoken(ESC + SPACE, answer.data + signed.data))
 
     def reports_off(self) -> Steps[str]:
         """Z without a number ends continuous reports (page 53), which come between its echo and its answer."""
@@ -262,17 +271,21 @@ class PartyLine(Handshake):
                 return
             # An LF would have half a line carried out, ESC would stop every axis. A line that is too long and no
             # command besides is refused by whoever listens.
-            yield Ask(SPOIL + LF if echo else LF, until(b"\n"), self.patience)
+            spoilt = yield Ask(SPOIL + LF if echo else LF, until(b"\n"), self.patience)
+            if echo == entered[:1] and not spoilt.whole:
+                echo = b""  # it is there, and takes nothing behind its name but | and @
+                break
         spoken = Spoken(entered, echo)
         if not echo:
             raise Deaf(self.title, "takes no line: a program runs, it jogs, or it is not there", spoken)
         raise BadAnswer(self.title, f"did not echo {entered!r} as it is; the line was spoilt", spoken)
 
     def interrupt(self, character: bytes) -> Steps[None]:
-        """Name and character: the echo of both comes with the second."""
-        data = self.name.encode("latin-1") + character
-        yield from self.ask(data, until(data), self.patience)
-        yield from self.ask(LF, until(b"\n"), self.patience)
+        """Name and character, each echoed, and LF; before that may come the end of a command that waited."""
+        yield from self.enter(character.decode("latin-1"))
+        ended = yield from self.ask(LF, until(b"\n"), self.patience)
+        if ended.startswith(b"#"):
+            yield from self.ask(b"", until(b"\n"), self.patience)
 
     def over(self) -> Steps[bool]:
         """Whether it says how it moves."""
@@ -413,9 +426,8 @@ class Adapter(Handshake):
         return replies.decode("latin-1").split("\r\n")[:-1]
 
     def interrupt(self, character: bytes) -> Steps[None]:
-        """The adapter waits for an echo that does not come while a program runs: only ESC goes through."""
-        raise Refused(self.title, "runs a program, and the SIN-10 brings it nothing but ESC: halt(), or abort()")
-        yield
+        """A command like any other for the adapter: the unit echoes name and character while it runs."""
+        yield from self.line(character.decode("latin-1"), 0.0)
 
     def over(self) -> Steps[bool]:
         """Whether it says how it moves."""
