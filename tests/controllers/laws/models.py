@@ -9,7 +9,7 @@ from tests.controllers.laws.adapter import Model
 MODELS: tuple[Model, ...] = (*gsc200.MODELS, *supersigma.MODELS, *dcb274.MODELS, *genstepper.MODELS)
 
 OPEN: Mapping[str, tuple[str, ...]] = {
-    "stops": ("dcb-274", "bs0610"),
+    "stops": ("bs0610",),
     "limits": ("bs0610",),
     "redefining": ("bs0610", "bs0710"),
 }
