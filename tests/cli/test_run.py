@@ -142,7 +142,7 @@ def test_steps_that_cannot_be_written_leave_the_file_alone(
 ) -> None:
     file = tmp_path / "out.csv"
     file.write_text("mine\n")
-    assert detent("run", "gs-c200", "--send", "+100", "--steps", str(file), *words) == 2
+    assert detent("run", "gs-c200", "--send", "+100", "--steps", str(file), "--force", *words) == 2
     assert said in " ".join(capsys.readouterr().err.replace("\u2502", " ").split())
     assert file.read_text() == "mine\n"
     assert list(tmp_path.iterdir()) == [file]
@@ -199,8 +199,8 @@ def test_a_motor_that_breaks_the_equations_ends_in_one_line(
     def breaks(*_: object, **__: object) -> None:
         raise MotorError("the rotor runs away")
 
-    monkeypatch.setattr("detent.cli.run._write", breaks)
+    monkeypatch.setattr("detent.cli.exports.write", breaks)
     assert detent("run", "gs-c200", "--plot", str(tmp_path / "a.png")) == 1
-    monkeypatch.setattr("detent.cli.run._run_on", breaks)
+    monkeypatch.setattr("detent.cli.run._Course.run", breaks)
     assert detent("run", "gs-c200") == 1
     assert capsys.readouterr().err.splitlines() == ["detent: the rotor runs away"] * 2

@@ -10,7 +10,7 @@ from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
 from detent.cell import real_pins
 from detent.cell.cell import Cell
 from detent.cell.deeds import Action, Power, SetSwitch, Type
-from detent.cell.delivery import Store, no_store
+from detent.cell.delivery import Store, Typed, no_store, nobody_asks
 from detent.cell.description import Description, Problem, ScriptEntry, Unit
 from detent.cell.fitting import check_names, mechanics, motors_by_axis, split_axis
 from detent.cell.mechanics import Mechanics
@@ -43,13 +43,15 @@ def build(
     record: bool = True,
     line_timing: bool = True,
     journal: Iterable[Action] = (),
+    typed: Typed = nobody_asks,
 ) -> Cell:
     """The cell, switched on at time 0, with its programs started.
 
-    `images` are the units' non-volatile memories as they were kept, `store` keeps them. `journal` is what was done
-    to a cell like this one: with it, the same happens again. Raises Problem.
+    `images` are the units' non-volatile memories as they were kept, `store` keeps them; `typed` is told of each command
+    line before it is sent. `journal` is what was done to a cell like this one: with it, the same happens again. Raises
+    Problem.
     """
-    return _Builder(description, read).cell(images or {}, store, record, line_timing, journal)
+    return _Builder(description, read).cell(images or {}, store, record, line_timing, journal, typed)
 
 
 class _End(NamedTuple):
@@ -75,8 +77,9 @@ class _Builder:
         return Problem(self.description.file, key, message)
 
     def cell(
-        self, images: Mapping[str, bytes], store: Store, record: bool, line_timing: bool, journal: Iterable[Action]
-    ) -> Cell:
+        self, images: Mapping[str, bytes], store: Store, record: bool, line_timing: bool, journal: Iterable[Action],
+        typed: Typed,
+    ) -> Cell:  # fmt: skip
         lines = self.line_units()
         self.make_units(lines, line_timing)
         self.make_motors(record)
@@ -89,7 +92,7 @@ class _Builder:
             real_pins.check(self.description, controllers, self.joined)
         cell = Cell(self.wiring(lines), self.parts, [Net() for _ in self.nets],
                     [self.line(name, units, line_timing) for name, units in lines.items()],
-                    [*actions, *journal], store=store, record=record)  # fmt: skip
+                    [*actions, *journal], store=store, record=record, typed=typed)  # fmt: skip
         self.switch_on(cell, images)
         cell.begin(journaling=record)
         return cell

@@ -25,7 +25,7 @@ from detent.cell.deeds import (
     SetSwitch,
     Start,
 )
-from detent.cell.delivery import Delivery, Store, no_store
+from detent.cell.delivery import Delivery, Store, Typed, no_store, nobody_asks
 from detent.cell.recording import Log, Received, Recording
 from detent.cell.wiring import Talker, Wiring
 from detent.controllers.device import Controller, Device
@@ -57,8 +57,10 @@ class Cell(Delivery):
         *,
         store: Store = no_store,
         record: bool = True,
+        typed: Typed = nobody_asks,
     ) -> None:
-        super().__init__(wiring, parts, nets, lines, store, Recording(wiring.names[: wiring.units]) if record else None)
+        recording = Recording(wiring.names[: wiring.units]) if record else None
+        super().__init__(wiring, parts, nets, lines, store, recording, typed)
         self.journal: Log[Action] = Log()  # what was done from outside, if it records: `build` takes it
         self.journaling = False  # see `begin`
         self._script = Script(sorted(script, key=lambda action: action.at))
@@ -181,6 +183,7 @@ class Cell(Delivery):
         line = self.wiring.line_of[index]
         if line < 0:
             raise ValueError(f"unit {unit!r} is on no line with a host outside: a unit that is its host can send to it")
+        self._outside.typed(unit, text)
         self.send(line, self.talker(unit).frame(text))
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:

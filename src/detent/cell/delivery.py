@@ -26,6 +26,9 @@ MOST_DELIVERIES = 1_000
 Store: TypeAlias = Callable[[str, bytes], bool]
 """Write the non-volatile image of a unit; say whether that succeeded."""
 
+Typed: TypeAlias = Callable[[str, str], None]
+"""A host is about to send the unit this command line, now."""
+
 
 class Oscillation(RuntimeError):
     """Outputs change each other without end in one instant."""
@@ -35,6 +38,7 @@ class Outside(NamedTuple):
     """What a cell reaches for outside: its copies reach for the same."""
 
     store: Store
+    typed: Typed
 
     def __deepcopy__(self, _: object) -> "Outside":
         return self
@@ -45,12 +49,16 @@ def no_store(unit: str, image: bytes) -> bool:
     return True
 
 
+def nobody_asks(unit: str, text: str) -> None:
+    """Nobody wants to know what is typed."""
+
+
 class Delivery:
     """The parts of a cell, what joins them, and what is broken of it. `now` is set by who knows the time (`Cell`)."""
 
     def __init__(
         self, wiring: Wiring, parts: Sequence[Device], nets: Sequence[Net], lines: Sequence[Line], store: Store,
-        recording: Recording | None,
+        recording: Recording | None, typed: Typed = nobody_asks,
     ) -> None:  # fmt: skip
         self.wiring = wiring
         self.parts = list(parts)
@@ -59,7 +67,7 @@ class Delivery:
         self.now: Ns = 0
         self.latest: Ns = min((getattr(part, "latest", NEVER - 1) for part in parts), default=NEVER - 1)
         self.recording = recording
-        self._outside = Outside(store)
+        self._outside = Outside(store, typed)
         self.faults = Faults()
         self._hands: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
         self._supplied: set[int] = set()  # units that are switched on

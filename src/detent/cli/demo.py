@@ -28,7 +28,7 @@ def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bo
         Print the timeline and the result as JSON.
     """
     from detent.cell.build import build
-    from detent.cli.run import result
+    from detent.cli import outcome
     from detent.cli.target import asked_wrongly, failed, target
     from detent.controllers.catalogue import unknown
     from detent.outputs.figures import check
@@ -48,7 +48,7 @@ def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bo
         failed(f"{output}: cannot write there: {error.strerror}; choose another folder with --output")
     if json:
         story = [line._asdict() for line in told]
-        facts = {**result(cell, "idle", []), "files": {kind: str(path) for kind, path in files.items()}}
+        facts = {**outcome.facts(outcome.quiet(cell)), "files": {kind: str(path) for kind, path in files.items()}}
         print(json_text.dumps({"demo": name, **facts, "timeline": story}))
         return
     _print_story(found.description, told)
@@ -162,13 +162,13 @@ def _print_story(description: "Description", told: list[Told]) -> None:
 
 
 def _print_end(cell: "Cell", told: list[Told], files: Mapping[str, Path], place: Path) -> None:
-    from detent.cli.run import print_result
+    from detent.cli import outcome
     from detent.ticks import SECOND
 
     holes = sum(line.unit == "drill" and line.instruction == "G0" for line in told)
     cut = next(line.at_ns for line in told if line.unit == "bar" and line.instruction == "A1")
     print(f"\n{holes} holes drilled, the bar cut off at {cut / SECOND:.3f} s.\n")
-    print_result(cell, "idle", [], [])
+    outcome.show(outcome.quiet(cell), [])
     shown = place.relative_to(Path.cwd()) if place.is_relative_to(Path.cwd()) else place
     print()
     print(f"Look at   {files['figure']}   with any viewer of pictures: positions, speeds, handshake")

@@ -1,7 +1,6 @@
 """The verb `run`: a cell in virtual time, as fast as it goes."""
 
 import json as json_text
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
@@ -10,8 +9,7 @@ from cyclopts import Parameter
 
 if TYPE_CHECKING:
     from detent.cell.cell import Cell
-    from detent.cli.target import Target
-    from detent.controllers.device import Controller
+    from detent.cell.conversation import Conversation, Exchange
     from detent.ticks import Ns
 
 MOST_INSTANTS = 500_000  # eventful instants without --for, after which a cell counts as endless
@@ -26,18 +24,22 @@ def run(
     plot: Path | None = None,
     vcd: Path | None = None,
     sr: Path | None = None,
+    sr_rate: int | None = None,
     npz: Path | None = None,
     steps: Path | None = None,
     steps_frequency: int = 12_000_000,
     steps_error: Literal["exact", "1us", "5us", "25us"] = "1us",
     strap: Sequence[str] = (),
     set_: Annotated[Sequence[str], Parameter(name="--set")] = (),
+    pin: Sequence[str] = (),
     line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
+    allow_loss: Annotated[bool, Parameter(negative=())] = False,
+    force: Annotated[bool, Parameter(negative=())] = False,
     json: bool = False,
 ) -> None:
     """Run a controller or a cell in virtual time and say where everything ended.
 
-    Without --for it ends when nothing is left to do.
+    Without --for it ends when nothing is left to do. Ends with status 1 if a line was refused or a motor lost steps.
 
     Parameters
     ----------
@@ -47,7 +49,8 @@ def run(
         A program to load and execute: FILE, or UNIT=FILE for a cell.
     send
         A command line for the unit to receive, without checksum and carriage return, which are added. Given
-        several times: each is sent when the one before has been answered. UNIT:LINE for a cell.
+        several times: each is sent when the one before has been answered. UNIT:LINE for a cell. '@ 500 ms' waits so
+        long in between, '@ idle' until nothing moves and no program runs.
     for_
         Virtual time to run, like 2.5 (seconds), '400 ms' or '1 h'.
     plot
@@ -56,6 +59,8 @@ def run(
         Write a value change dump with every pin and pulse (GTKWave, PulseView).
     sr
         Write a sigrok session (PulseView, sigrok-cli).
+    sr_rate
+        Samples a second of the sigrok session; 1000000 unless given. Fewer make long runs quick.
     npz
         Write pulse times and pin changes as NumPy arrays.
     steps
@@ -68,66 +73,95 @@ def run(
         PIN=LEVEL (low, high, open), or UNIT.PIN=LEVEL for a cell.
     set_
         OPTION=VALUE, or UNIT.OPTION=VALUE for a cell.
+    pin
+        PIN=LEVEL: an input is held at a level, or UNIT.PIN=LEVEL for a cell.
     line_timing
         Let characters take their time on the serial line.
+    allow_loss
+        A motor that loses steps is told, and no failure.
+    force
+        Write over files that were not made by a run.
     json
         Print the result as one line of JSON.
     """
     from detent.cell.build import build
+    from detent.cell.conversation import Conversation
     from detent.cell.delivery import Oscillation
     from detent.cell.description import Problem
+    from detent.cli import FAILED, exports, outcome
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
+    from detent.extras import MissingExtra
     from detent.motors.motor import MotorError
-    from detent.outputs.figures import check
-    from detent.ticks import parse_duration
+    from detent.ticks import parse_duration, show_duration
 
+    wanted = exports.Wanted(plot, vcd, sr, npz, steps, sr_rate, steps_frequency, steps_error)
+    conversation = Conversation()
     try:
-        found = find(target, straps=strap, options=set_, programs=program)
+        found = find(target, straps=strap, options=set_, programs=program, pins=pin)
         until = None if for_ is None else parse_duration(for_)
-        if plot is not None:
-            check(plot)
-        if steps_frequency < 1:
-            raise ValueError(f"--steps-frequency {steps_frequency}: a clock has 1 tick a second or more, like 12000000")
-        wanted = [path for path in (plot, vcd, sr, npz, steps) if path is not None]
-        cell = build(found.description, found.read, record=bool(wanted), line_timing=line_timing)
+        wanted.check(found.inputs, force=force)
+        cell = build(found.description, found.read, record=bool(wanted.paths), line_timing=line_timing,
+                     typed=conversation.typed)  # fmt: skip
+        witness = conversation.attend(cell, keeps=bool(wanted.paths))
         lines = [_addressed(cell, text) for text in send]
-    except Problem as error:
-        asked_wrongly(error)
+        if until is not None and until > cell.latest:
+            raise Problem("", "--for", f"with a motor a cell runs for {show_duration(cell.latest)} at most")
+    except MissingExtra as error:
+        failed(error)
     except ValueError as error:
         asked_wrongly(error)
+    course = _Course(cell, conversation, until)
     try:
-        exchanges = [_exchange(cell, unit, text) for unit, text in lines]
-        ended = _run_on(cell, until)
+        ended = course.run(lines)
+        motors = outcome.motors(cell)
     except (Oscillation, MotorError) as error:
         failed(error)
+    told = outcome.Outcome(cell, ended, conversation, course.sent, course.unsent, list(witness.moving), motors)
     try:
-        _write(cell, found, plot=plot, vcd=vcd, sr=sr, npz=npz, steps=steps, clock=(steps_frequency, steps_error))
+        exports.write(cell, found, wanted)
     except MotorError as error:
         failed(error)
     except ValueError as error:
         asked_wrongly(error)
     except OSError as error:
-        failed(f"{error.filename}: cannot write it: {error.strerror}")
+        failed(f"{error.filename}: cannot write it: {error.strerror or error}")
     if json:
-        print(json_text.dumps(result(cell, ended, exchanges)))
+        print(json_text.dumps(outcome.facts(told)))
     else:
-        print_result(cell, ended, exchanges, wanted)
+        outcome.show(told, wanted.paths)
+    outcome.warn(told)
+    if told.refused or told.unsent or (not allow_loss and any(motor.lost for motor in motors)):
+        raise SystemExit(FAILED)
 
 
-class Exchange(NamedTuple):
-    """A command line and what came back."""
+class Line(NamedTuple):
+    """A command line to a unit."""
 
     unit: str
-    sent: str
-    answers: list[str]
+    text: str
 
 
-def _addressed(cell: "Cell", text: str) -> tuple[str, str]:
-    """The unit a line is for, and the line."""
+class Pause(NamedTuple):
+    """Wait so long; None: until nothing moves and no program runs."""
+
+    length: "Ns | None"
+
+
+Step = Line | Pause
+
+
+def _addressed(cell: "Cell", text: str) -> Step:
+    """What a --send asks for. Raises Problem."""
     from detent.cell.description import Problem
     from detent.controllers.catalogue import unknown
+    from detent.ticks import parse_duration
 
+    if text.startswith("@ ") or text == "@idle":
+        try:
+            return Pause(None if text[1:].strip() == "idle" else parse_duration(text[1:]))
+        except ValueError as error:
+            raise Problem("", "--send", f"{error}; or '@ idle'") from None
     units = cell.talkers() or list(cell.controllers())
     unit, colon, line = (units[0], ":", text) if len(units) == 1 else text.partition(":")
     if not colon:
@@ -140,140 +174,98 @@ def _addressed(cell: "Cell", text: str) -> tuple[str, str]:
         cell.talker(unit).frame(line)
     except ValueError as error:
         raise Problem("", "--send", str(error)) from None
-    return unit, line
+    return Line(unit, line)
 
 
-def _exchange(cell: "Cell", unit: str, text: str) -> Exchange:
-    """Send a line and let the cell go on until it is answered and the line is quiet, or nothing is left to do."""
-    from detent.controllers.catalogue import model
-    from detent.ticks import NEVER
+class _Course:
+    """The way of a cell through the lines that it is sent, to its end; never beyond `until`."""
 
-    line, controller = cell.lines[cell.wiring.line_of[cell.unit(unit)]], cell.talker(unit)
+    def __init__(self, cell: "Cell", conversation: "Conversation", until: "Ns | None") -> None:
+        self._cell, self._conversation, self._until = cell, conversation, until
+        self.sent: list[Exchange] = []
+        self.unsent: list[Line] = []  # as the time was over
 
-    def heard() -> list[str]:
-        return controller.answers(bytes(h.char.value for h in line.heard))
+    def run(self, steps: Sequence[Step]) -> str:
+        """How it ended, in a word: time, idle, endless."""
+        for place, step in enumerate(steps):
+            if isinstance(step, Pause):
+                self._wait(step)
+            elif not self._exchange(step):
+                self.unsent = [left for left in steps[place:] if isinstance(left, Line)]
+                break
+        return self._run_on()
 
-    one = cell.controllers().get(unit)  # none: an adapter
-    while one is not None and one.status(cell.now).state == "starting" and cell.step() is not None:
-        pass  # a board that is deaf after its reset
-    while line.deadline < NEVER and cell.step() is not None:
-        pass
-    line.take()
-    cell.type(unit, text)
-    answered = one is None or model(one.model).answered(text)
-    for _ in range(MOST_INSTANTS):
-        busy = getattr(controller, "answering", False)  # of those that know: an echo is no answer yet
-        if line.deadline >= NEVER and not busy and (not answered or heard()):
-            break
-        if cell.step() is None:
-            break
-    answers = heard()
-    line.take()
-    return Exchange(unit, text, answers)
+    def _step(self) -> bool:
+        """Let the next eventful instant happen; False if there is none, or only behind the time."""
+        at = self._cell.next_event()
+        if at is None or (self._until is not None and at > self._until):
+            return False
+        self._cell.step()
+        return True
 
+    def _wait(self, pause: Pause) -> None:
+        cell = self._cell
+        if pause.length is not None:
+            until = cell.now + pause.length
+            cell.run_to(until if self._until is None else min(until, max(self._until, cell.now)))
+            return
+        for _ in range(MOST_INSTANTS):
+            if not self._busy() or not self._step():
+                return
 
-def _run_on(cell: "Cell", until: "Ns | None") -> str:
-    """Run to `until`, or until nothing is left to do: how it ended, in a word: time, idle, endless."""
-    if until is not None:
-        cell.run_to(max(until, cell.now))
-        return "time"
-    for _ in range(MOST_INSTANTS):
-        if cell.step() is None:
-            return "idle"
-    return "endless"
+    def _busy(self) -> bool:
+        """Whether anything moves, a program runs, or something is still being said."""
+        from detent.cell.conversation import Witness
+        from detent.ticks import NEVER
 
+        cell = self._cell
+        assert isinstance(cell.recording, Witness)
+        if cell.recording.moving or any(line.deadline < NEVER for line in cell.lines):
+            return True
+        states = [unit.status(cell.now, axis).state for unit in cell.controllers().values() for axis in unit.axes]
+        return any(state in ("running", "homing", "moving", "starting") for state in states)
 
-def _write(
-    cell: "Cell", target: "Target", *, plot: Path | None, vcd: Path | None, sr: Path | None, npz: Path | None,
-    steps: Path | None, clock: tuple[int, str],
-) -> None:  # fmt: skip
-    """Write the files that are wanted. Raises ValueError for a wrong choice, OSError."""
-    if plot is None and vcd is None and sr is None and npz is None and steps is None:
-        return
-    from detent.outputs import signals
-    from detent.ticks import parse_duration
+    def _exchange(self, line: Line) -> bool:
+        """Send a line and let the cell go on until it is answered and the line is quiet, or nothing is left to do.
 
-    described = target.description
-    seen = signals.of_cell(cell, {name: unit.shaft for name, unit in described.units.items()})
-    if vcd is not None:
-        from detent.outputs import vcd as vcd_file
+        False if the time is over before it can be sent.
+        """
+        from detent.controllers.catalogue import model
+        from detent.ticks import NEVER
 
-        vcd_file.write(vcd, seen)
-    if sr is not None:
-        from detent.outputs import sigrok
+        cell, conversation = self._cell, self._conversation
+        wire, controller = cell.lines[cell.wiring.line_of[cell.unit(line.unit)]], cell.talker(line.unit)
+        one = cell.controllers().get(line.unit)  # none: an adapter
+        while one is not None and one.status(cell.now).state == "starting" and self._step():
+            pass  # a board that is deaf after its reset
+        while wire.deadline < NEVER and self._step():
+            pass
+        after = cell.next_event()
+        if self._until is not None and cell.now >= self._until and after is not None and after > self._until:
+            return False
+        wire.take()
+        conversation.scripted = False
+        cell.type(line.unit, line.text)
+        conversation.scripted = True
+        exchange = conversation.exchanges[-1]
+        self.sent.append(exchange)
+        answered = one is None or model(one.model).answered(line.text)
+        for _ in range(MOST_INSTANTS):
+            conversation.listen()
+            busy = getattr(controller, "answering", False)  # of those that know: an echo is no answer yet
+            if wire.deadline >= NEVER and not busy and (not answered or conversation.answers(exchange)):
+                break
+            if not self._step():
+                break
+        return True
 
-        sigrok.write(sr, seen)
-    if npz is not None:
-        from detent.outputs import arrays
-
-        arrays.write(npz, seen)
-    if steps is not None:
-        from detent.outputs import step_file
-
-        frequency, error = clock
-        try:
-            step_file.write(steps, seen, frequency, "exact" if error == "exact" else parse_duration(error))
-        except ValueError as problem:
-            raise ValueError(f"--steps-frequency {frequency}: {problem}; take a faster clock") from None
-    if plot is not None:
-        from detent.outputs import figures, rotors
-
-        figures.write(plot, seen, title=described.title or target.name, rotors=rotors.of_cell(cell))
-
-
-def result(cell: "Cell", ended: str, exchanges: list[Exchange]) -> dict[str, object]:
-    """Where everything ended, as --json prints it."""
-    units = {name: _where(unit, cell.now) for name, unit in cell.controllers().items()}
-    result: dict[str, object] = {"time_ns": cell.now, "ended": ended, "units": units}
-    if exchanges:
-        result["exchanges"] = [exchange._asdict() for exchange in exchanges]
-    return result
-
-
-def _where(unit: "Controller", now: "Ns") -> dict[str, object]:
-    """Where a unit is; one with several axes names the place of each."""
-    where: dict[str, object] = unit.status(now)._asdict()
-    if len(unit.axes) > 1:
-        places = {axis: unit.status(now, axis) for axis in unit.axes}
-        where["axes"] = {axis: {"position": at.position, "pulses": at.pulses} for axis, at in places.items()}
-    return where
-
-
-def print_result(cell: "Cell", ended: str, exchanges: list[Exchange], written: list[Path]) -> None:
-    """Where everything ended, for people."""
-    from rich.console import Console
-    from rich.table import Table
-
-    from detent.ticks import show_duration
-
-    console = Console(highlight=False)
-    several = len(cell.controllers()) > 1
-    for exchange in exchanges:
-        console.print(f"> {exchange.unit + ': ' if several else ''}{exchange.sent}", markup=False)
-        for answer in exchange.answers:
-            console.print(f"< {answer}", markup=False)
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for column in ("unit", "model", "position", "pulses", "state"):
-        table.add_column(column, justify="right" if column in ("position", "pulses") else "left")
-    moving = []
-    for name, unit in cell.controllers().items():
-        for axis in unit.axes:
-            status = unit.status(cell.now, axis)
-            shown = f"{name}.{axis}" if axis else name
-            table.add_row(shown, unit.model, str(status.position), str(status.pulses), status.state)
-            if status.state in ("running", "homing"):
-                moving.append(shown)
-    console.print(table)
-    time = show_duration(cell.now)
-    match ended:
-        case "idle" if moving:
-            print(f"Nothing more will happen by itself after {time}; {', '.join(moving)} still at work.")
-        case "idle":
-            print(f"Nothing left to do after {time} of virtual time.")
-        case "endless":
-            print(f"Stopped at {time}: after {MOST_INSTANTS} events the program looks endless.", file=sys.stderr)
-            print("Say how long to run it: --for TIME, like --for 60", file=sys.stderr)
-        case _:
-            print(f"Ran for {time} of virtual time.")
-    for path in written:
-        print(f"Wrote {path}")
+    def _run_on(self) -> str:
+        """Run to the time, or until nothing is left to do."""
+        cell = self._cell
+        if self._until is not None:
+            cell.run_to(max(self._until, cell.now))
+            return "time"
+        for _ in range(MOST_INSTANTS):
+            if cell.step() is None:
+                return "idle"
+        return "endless"

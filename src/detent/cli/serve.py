@@ -30,6 +30,7 @@ def serve(
     line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
     strap: Annotated[Sequence[str], Parameter(negative=())] = (),
     set_: Annotated[Sequence[str], Parameter(name="--set", negative=())] = (),
+    pin: Annotated[Sequence[str], Parameter(negative=())] = (),
     state: Path | None = None,
     control: str | None = None,
     token: str | None = None,
@@ -60,6 +61,8 @@ def serve(
         PIN=LEVEL (low, high, open), or UNIT.PIN=LEVEL for a cell.
     set_
         OPTION=VALUE, or UNIT.OPTION=VALUE for a cell.
+    pin
+        PIN=LEVEL: an input is held at a level, or UNIT.PIN=LEVEL for a cell; `detent control` can change it.
     state
         Keep EEPROM images in this folder instead of $XDG_STATE_HOME/detent or ~/.local/state/detent.
     control
@@ -87,7 +90,7 @@ def serve(
             raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
         wanted = asked_endpoints(links, tcp, rfc2217, serial)
         control_at = None if control is None else _address("--control", control)
-        found = find(target, straps=strap, options=set_)
+        found = find(target, straps=strap, options=set_, pins=pin)
         folder = state if state is not None else default_folder()
         name = cell_name(target, is_file=bool(found.description.file))
         images = Images(folder, name, models(found.description))

@@ -79,6 +79,7 @@ class Model(NamedTuple):
     told_apart_by: str = ""  # the option, an attribute of the controller too, in which units of one line must differ
     answered: Callable[[str], bool] = lambda text: True  # whether a host gets an answer to a command line
     limits: Limits = NO_LIMITS
+    echoes: bool = False  # whether a unit sends back what its host types
     by_hand: str = ""  # a line for people who type to it on a terminal
     saves: str = ""  # the command line that keeps program memory without supply; "" where none does
     phrases: Callable[[Mapping[str, Level]], Phrases] = lambda straps: Lines()  # what is said on its line, in words
@@ -358,6 +359,7 @@ MODELS: dict[str, Model] = {
         dcb274_program.language,
         dcb274_commands.reference,
         dcb274_pins.strap_line,
+        echoes=True,
         saves=dcb274_commands.Op.SAVE.value,
         phrases=lambda straps: Dcb274Phrases(),
     ),

@@ -14,7 +14,7 @@ signals give the same bytes.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
@@ -23,23 +23,36 @@ import numpy as np
 import numpy.typing as npt
 
 from detent.cell.recording import Span
-from detent.outputs.files import open_whole
-from detent.outputs.signals import Signals, UnitSignals
+from detent.outputs.files import MARK, open_whole
+from detent.outputs.signals import Signals, UnitSignals, Watch, nobody_looks
 from detent.outputs.waves import UNKNOWN
 from detent.pulses.segment import Int64Array
 
 BLOCK = 1 << 18  # pulses made at a time
 
 
-def write(path: Path, signals: Signals, meta: Mapping[str, Any] | None = None) -> None:
-    """Write the file, whole or not at all. `meta` must be fit for JSON. OSError if it cannot be written."""
+def size(signals: Signals) -> int:
+    """About how many bytes there are before they are compressed."""
+    return sum(unit.pulse_count * (17 + 10 * len(unit.windings)) for unit in signals.units) + sum(
+        9 * len(unit.logged(pin).times) for unit in signals.units for pin in unit.pins
+    )
+
+
+def write(path: Path, signals: Signals, meta: Mapping[str, Any] | None = None, watch: Watch = nobody_looks) -> None:
+    """Write the file, whole or not at all. `meta` must be fit for JSON; `watch` is told how far it is.
+
+    OSError if it cannot be written.
+    """
     about = {"until_ns": signals.until, "units": {unit.name: _about(unit) for unit in signals.units}, **(meta or {})}
     text = np.array(json.dumps(about, sort_keys=True))
     with open_whole(path) as file, ZipFile(file, "w", ZIP_DEFLATED) as archive:
+        archive.comment = MARK
         _put(archive, "meta", text.dtype, (), [text])
+        total, done = 3 * sum(unit.pulse_count for unit in signals.units), 0
         for unit in signals.units:
-            _put_unit(archive, unit)
+            _put_unit(archive, unit, lambda pulses, before=done: watch(before + pulses, total))  # type: ignore[misc]
             _put_windings(archive, unit, signals)
+            done += 3 * unit.pulse_count
 
 
 def _about(unit: UnitSignals) -> dict[str, Any]:
@@ -59,12 +72,22 @@ def _about(unit: UnitSignals) -> dict[str, Any]:
     }
 
 
-def _put_unit(archive: ZipFile, unit: UnitSignals) -> None:
+def _put_unit(archive: ZipFile, unit: UnitSignals, told: Callable[[int], None]) -> None:
+    """The arrays of a unit; `told` how many pulses are in them so far, each counted in the three that it is in."""
     name, count, int64 = unit.name, (unit.pulse_count,), np.dtype(np.int64)
-    _put(archive, f"{name}/step_times", int64, count, (span.train.times(a, b) for span, a, b in _blocks(unit.spans)))
-    signs = (np.full(b - a + 1, span.direction, np.int8) for span, a, b in _blocks(unit.spans))
+    done = 0
+
+    def blocks() -> Iterator[tuple[Span, int, int]]:
+        nonlocal done
+        for span, first, last in _blocks(unit.spans):
+            yield span, first, last
+            done += last - first + 1
+            told(done)
+
+    _put(archive, f"{name}/step_times", int64, count, (span.train.times(a, b) for span, a, b in blocks()))
+    signs = (np.full(b - a + 1, span.direction, np.int8) for span, a, b in blocks())
     _put(archive, f"{name}/step_directions", np.dtype(np.int8), count, signs)
-    places = (span.shaft + span.direction * np.arange(a, b + 1, dtype=np.int64) for span, a, b in _blocks(unit.spans))
+    places = (span.shaft + span.direction * np.arange(a, b + 1, dtype=np.int64) for span, a, b in blocks())
     _put(archive, f"{name}/positions", int64, count, places)
     for pin in unit.pins:
         if pin not in unit.unlogged and pin not in unit.windings:

@@ -13,7 +13,7 @@ import numpy as np
 from detent.extras import need
 from detent.outputs import curves
 from detent.outputs.curves import Band
-from detent.outputs.files import write_whole
+from detent.outputs.files import MARK, write_whole
 from detent.outputs.rotors import RotorTrace
 from detent.outputs.signals import Signals, UnitSignals
 from detent.outputs.waves import UNKNOWN
@@ -63,6 +63,14 @@ class Strip(NamedTuple):
     bands: Sequence[Band]
 
 
+STAMPS: dict[str, dict[str, Any]] = {
+    "png": {"Software": MARK.decode()},
+    "svg": {"Date": None, "Creator": MARK.decode()},
+    "pdf": {"CreationDate": None, "Creator": MARK.decode()},
+}
+"""What a figure says of itself: who made it, and not when, so that the same run gives the same bytes."""
+
+
 def check(path: Path) -> None:
     """ValueError if no figure can be written to a file of this name, MissingExtra if none can be drawn here."""
     if path.suffix.lower() not in FORMATS:
@@ -89,10 +97,7 @@ def write(
     data = BytesIO()
     with style():
         kind = path.suffix.lower()[1:]
-        no_date: dict[str, Any] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}[
-            kind
-        ]
-        figure.savefig(data, format=kind, metadata=no_date)
+        figure.savefig(data, format=kind, metadata=STAMPS[kind])
     write_whole(path, data.getvalue())
 
 

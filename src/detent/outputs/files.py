@@ -1,11 +1,40 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and never in the place of somebody else's."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 from typing import BinaryIO
+
+MARK = b"Made by detent"
+"""What every output carries near its begin or its end, so that the next run may put a newer one in its place."""
+
+_MARKS = (MARK, b"axis,direction,base,interval,count,add")  # the head of a step file is mark enough
+_LOOKED_AT = 4096  # bytes at each end
+
+
+class NotOurs(ValueError):
+    """A file that is in the way of an output. The text says what to do."""
+
+
+def check_place(path: Path, inputs: Sequence[Path] = ()) -> None:
+    """Raise NotOurs if an output to `path` would replace one of the `inputs`, or a file that no run has made."""
+    if any(path.exists() and one.exists() and path.samefile(one) for one in inputs):
+        raise NotOurs(f"{path} is read by this run: write to another file, or over it with --force")
+    if path.is_file() and not _is_ours(path):
+        raise NotOurs(
+            f"{path} is there already, and was not made by a run: write to another file, or over it with --force"
+        )
+
+
+def _is_ours(path: Path) -> bool:
+    with path.open("rb") as file:
+        begin = file.read(_LOOKED_AT)
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(size - _LOOKED_AT, 0))
+        ends = begin + file.read()
+    return not size or any(mark in ends for mark in _MARKS)
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -24,8 +53,18 @@ def open_whole(path: Path) -> Iterator[BinaryIO]:
     The data goes to a temporary file in the same folder, is flushed to the disk and takes the name in one
     step; a file that was there gives its permissions, and a link keeps pointing to the file it names. What
     is no regular file (a pipe, a terminal) is written straight, as nothing can be kept whole there. Raises
-    OSError if it cannot be done; the temporary file is then gone.
+    OSError with the name of `path` if it cannot be done; the temporary file is then gone.
     """
+    try:
+        with _opened(path) as file:
+            yield file
+    except OSError as error:
+        error.filename, error.filename2 = str(path), None
+        raise
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
     if path.exists() and not path.is_file():
         with path.open("wb") as straight:
             yield straight

@@ -6,7 +6,7 @@ Need matplotlib, which is imported when a figure is made.
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from detent.motors.curve import PullOut
 from detent.motors.move import Run
 from detent.motors.named import Measured
 from detent.motors.rotor import Rig
-from detent.outputs.figures import COLOURS, DPI, GREY, PALE, check, style
+from detent.outputs.figures import COLOURS, DPI, GREY, PALE, STAMPS, check, style
 from detent.outputs.files import write_whole
 
 if TYPE_CHECKING:
@@ -111,6 +111,5 @@ def save(figure: "Figure", path: Path) -> None:
     check(path)
     data = BytesIO()
     kind = path.suffix.lower()[1:]
-    stamps: dict[str, Any] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    figure.savefig(data, format=kind, metadata=stamps[kind])
+    figure.savefig(data, format=kind, metadata=STAMPS[kind])
     write_whole(path, data.getvalue())

@@ -5,8 +5,8 @@ window of time at a time (:meth:`Signals.windows`): nothing here costs a Python 
 """
 
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,14 @@ from detent.ticks import Ns
 WINDOW = 1 << 14  # pulses of a unit, or changes of a pin, in one window
 LATEST: Ns = (1 << 62) - 1  # later times, or sums of them, int64 does not hold
 
+Watch: TypeAlias = Callable[[int, int], None]
+"""Told how much of an output is done, of how much."""
+
 _MOTION = (MotionStarted, MotionCut, MotionEnded)
+
+
+def nobody_looks(done: int, total: int) -> None:
+    """Nobody wants to know how far it is."""
 
 
 class Pulses(NamedTuple):
@@ -165,6 +172,10 @@ class UnitSignals:
             last = min(span.last, span.train.steps_by(end - 1))
             if first <= last:
                 yield span, first, last
+
+    def logged(self, pin: str) -> Wave:
+        """The changes of a pin that were recorded one by one: without those that follow from pulses."""
+        return self._waves[pin]
 
     def pulses_for(self, begin: Ns, end: Ns) -> Pulses:
         """The pulses that can change a pin in a window: also those whose end falls into it."""

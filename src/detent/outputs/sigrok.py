@@ -12,8 +12,8 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import numpy as np
 
-from detent.outputs.files import open_whole
-from detent.outputs.signals import Signals, UnitSignals
+from detent.outputs.files import MARK, open_whole
+from detent.outputs.signals import Signals, UnitSignals, Watch, nobody_looks
 from detent.outputs.waves import Levels
 from detent.pulses.segment import Int64Array
 from detent.ticks import SECOND, Ns
@@ -52,11 +52,20 @@ def channels(signals: Signals, names: Sequence[str] | None = None) -> list[Chann
     return [every[name] for name in names]
 
 
-def write(path: Path, signals: Signals, *, samplerate: int = SAMPLERATE, names: Sequence[str] | None = None) -> None:
+def size(signals: Signals, samplerate: int = SAMPLERATE) -> int:
+    """How many bytes the samples have before they are compressed."""
+    return (signals.until * samplerate // SECOND + 1) * _unitsize(channels(signals))
+
+
+def write(
+    path: Path, signals: Signals, *, samplerate: int = SAMPLERATE, names: Sequence[str] | None = None,
+    watch: Watch = nobody_looks,
+) -> None:  # fmt: skip
     """Write the file, whole or not at all.
 
-    `samplerate` is in samples a second, `names` chooses channels. ValueError for a samplerate that is too low
-    for the edges of a channel, or too high for a run of this length; OSError if the file cannot be written.
+    `samplerate` is in samples a second, `names` chooses channels, `watch` is told how far it is. ValueError for a
+    samplerate that is too low for the edges of a channel, or too high for a run of this length; OSError if the file
+    cannot be written.
     """
     if samplerate < 1:
         raise ValueError(f"a samplerate is at least 1 sample a second, not {samplerate}")
@@ -69,10 +78,14 @@ def write(path: Path, signals: Signals, *, samplerate: int = SAMPLERATE, names: 
         )
     chosen = channels(signals, names)
     with open_whole(path) as file, ZipFile(file, "w", ZIP_DEFLATED) as archive:
+        archive.comment = MARK
         _put(archive, "version", b"2")
         _put(archive, "metadata", _metadata(chosen, samplerate))
+        done = 0
         for number, chunk in enumerate(_chunks(signals, chosen, samplerate, samples), 1):
             _put(archive, f"logic-1-{number}", chunk)
+            done += len(chunk) // _unitsize(chosen)
+            watch(done, samples)
 
 
 def _put(archive: ZipFile, name: str, data: bytes) -> None:
@@ -101,11 +114,20 @@ def _chunks(signals: Signals, chosen: Sequence[Channel], samplerate: int, sample
     size = min(CHUNK, max(LONGEST * samplerate // SECOND, 1))
     for first in range(0, samples, size):
         count = min(size, samples - first)
-        rows = np.zeros((count, _unitsize(chosen)), np.uint8)
+        steady = np.zeros((1, _unitsize(chosen)), np.uint8)  # what does not change in this chunk
+        changing: list[tuple[int, Levels]] = []
         for number, sampler in enumerate(samplers):
             levels = sampler.levels(first, count)
-            if len(levels) > 1 or levels[0]:
-                rows[:, number // 8] |= levels << (number % 8)
+            if len(levels) > 1:
+                changing.append((number, levels))
+            else:
+                steady[0, number // 8] |= levels[0] << (number % 8)
+        if not changing:
+            yield steady.tobytes() * count
+            continue
+        rows = np.repeat(steady, count, axis=0)
+        for number, levels in changing:
+            rows[:, number // 8] |= levels << (number % 8)
         yield rows.tobytes()
 
 

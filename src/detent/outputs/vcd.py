@@ -5,15 +5,15 @@ An output without supply is x. A winding end of a driver on the board is a vecto
 change at every step; 256 counts a period are always on. The same signals give the same bytes.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from detent.outputs.files import open_whole
-from detent.outputs.signals import Signals, UnitSignals
+from detent.outputs.files import MARK, open_whole
+from detent.outputs.signals import Signals, UnitSignals, Watch, nobody_looks
 from detent.outputs.waves import BEFORE_ALL
 from detent.pulses.segment import Int64Array
 from detent.ticks import Ns
@@ -36,14 +36,25 @@ class _Rows(NamedTuple):
     values: Int64Array
 
 
-def write(path: Path, signals: Signals) -> None:
-    """Write the file, whole or not at all. OSError if it cannot be written."""
+def write(path: Path, signals: Signals, watch: Watch = nobody_looks) -> None:
+    """Write the file, whole or not at all. `watch` is told how far it is. OSError if it cannot be written."""
     with open_whole(path) as file:
-        for piece in pieces(signals):
+        for piece in pieces(signals, watch):
             file.write(piece)
 
 
-def pieces(signals: Signals) -> Iterator[bytes]:
+def size(signals: Signals) -> int:
+    """About how many bytes the file will have."""
+    time, total = len(str(signals.until)) + 2, 0
+    for unit in signals.units:
+        bits = max(abs(unit.position(signals.until)), abs(unit.start)).bit_length() + 1
+        a_pulse = time + bits + 4 + sum(time // 2 + 4 for _ in unit.windings)
+        total += unit.pulse_count * (a_pulse + (time + 6 if unit.unlogged else 0))
+        total += sum(len(unit.logged(pin).times) * (time + 3) for pin in unit.pins)
+    return total
+
+
+def pieces(signals: Signals, watch: Watch = nobody_looks) -> Iterator[bytes]:
     """The file in pieces, in order."""
     dump = _Dump(signals)
     yield dump.header()
@@ -53,6 +64,7 @@ def pieces(signals: Signals) -> Iterator[bytes]:
         if len(rows.times):
             yield dump.text(rows, now)
             now = int(rows.times.max())
+        watch(min(end, signals.until), signals.until)
     if now < signals.until:
         yield b"#%d\n" % signals.until
 
@@ -72,14 +84,14 @@ class _Dump:
 
     def header(self) -> bytes:
         """Everything up to the first change after 0, the levels before it included."""
-        about = "Made by detent. position: the commanded one, in steps."
+        about = f"{MARK.decode()}. position: the commanded one, in steps."
         if any(unit.windings for unit in self._signals.units):
             about += " Winding ends: PWM counts, 256 counts a period."
         lines = [f"$comment {about} $end", "$timescale 1 ns $end"]
         initial = ["#0", "$dumpvars"]
         identifiers = (identifier.decode() for identifier in self._identifiers)
-        for unit in self._signals.units:
-            lines.append(f"$scope module {_word(unit.name)} $end")
+        for unit, scope in zip(self._signals.units, _scopes(self._signals.units), strict=True):
+            lines.append(f"$scope module {scope} $end")
             for pin in _levels(unit):
                 identifier = next(identifiers)
                 lines.append(f"$var wire 1 {identifier} {_word(pin)} $end")
@@ -205,6 +217,20 @@ def _identifier(number: int) -> bytes:
     return name
 
 
+def _scopes(units: Sequence[UnitSignals]) -> list[str]:
+    """The names of the units, made different where this format would make them alike."""
+    found: list[str] = []
+    for unit in units:
+        name = _word(unit.name)
+        number = 1
+        while name in found:
+            number += 1
+            name = f"{_word(unit.name)}_{number}"
+        found.append(name)
+    return found
+
+
 def _word(name: str) -> str:
-    """A name without white space, which ends a name in this format."""
-    return "_".join(name.split())
+    """A name without white space, which ends a name in this format, and without the $ that begins its keywords."""
+    word = "_".join(name.split())
+    return f"_{word[1:]}" if word.startswith("$") else word

@@ -4,8 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from detent.cell.description import Description, Problem, parse, single
+from detent.cell.description import Description, Problem, Switch, parse, single
+from detent.cell.parts import PARTS
 from detent.controllers import catalogue
+from detent.pins import PinKind
 from detent.realtime.texts import read_text
 
 
@@ -15,6 +17,7 @@ class Target(NamedTuple):
     description: Description
     read: Callable[[str], str]
     name: str
+    inputs: tuple[Path, ...] = ()  # every file that it is read from
 
 
 def target(
@@ -23,10 +26,12 @@ def target(
     straps: Sequence[str] = (),
     options: Sequence[str] = (),
     programs: Sequence[str] = (),
+    pins: Sequence[str] = (),
 ) -> Target:
-    """The cell that `text` (MODEL or CELL.toml) means. Straps and options are written NAME=VALUE.
+    """The cell that `text` (MODEL or CELL.toml) means. Straps, options and pins are written NAME=VALUE.
 
-    For a cell they say which unit: UNIT.NAME=VALUE, and programs UNIT=FILE. Raises Problem.
+    For a cell they say which unit: UNIT.NAME=VALUE, and programs UNIT=FILE. A pin is an input that is held at a level
+    by a switch of its name, from before the supply comes. Raises Problem.
     """
     if text.endswith(".toml") or "/" in text:
         path = Path(text)
@@ -34,8 +39,10 @@ def target(
             source = read_text(path)
         except (OSError, ValueError) as error:  # ValueError: a name with a NUL
             raise Problem(text, "", f"cannot read it: {getattr(error, 'strerror', None) or error}") from None
-        description = _with_choices(parse(source, text), straps, options, programs)
-        return Target(description, lambda file: read_text(path.parent / file), path.stem)
+        description = _with_pins(_with_choices(parse(source, text), straps, options, programs), pins, "")
+        files = [file for unit in description.units.values() for file in (unit.program, unit.eeprom) if file]
+        inputs = (path, *(path.parent / file for file in files))
+        return Target(description, lambda file: read_text(path.parent / file), path.stem, inputs)
     try:
         catalogue.model(text)
     except catalogue.CatalogueError as error:
@@ -48,7 +55,8 @@ def target(
         options=dict(_pair("--set", item) for item in options),
         program=programs[0] if programs else None,
     )
-    return Target(description, lambda file: read_text(Path(file)), text)
+    description = _with_pins(description, pins, text)
+    return Target(description, lambda file: read_text(Path(file)), text, tuple(map(Path, programs)))
 
 
 def _pair(flag: str, item: str) -> tuple[str, str]:
@@ -77,6 +85,37 @@ def _with_choices(
         units[unit]["program"] = str(Path(file).absolute())
     changed = {name: type(description.units[name]).model_validate(unit) for name, unit in units.items()}
     return description.model_copy(update={"units": changed})
+
+
+def _with_pins(description: Description, pins: Sequence[str], alone: str) -> Description:
+    """The description with inputs held at a level; those of the unit `alone`, if it is, are written without it."""
+    switches = dict(description.switches)
+    for item in pins:
+        place, value = _pair("--pin", item)
+        unit, dot, name = (alone, ".", place) if alone else place.rpartition(".")
+        if not dot:
+            raise Problem("", "--pin", f"{item!r}: a cell has several units, write UNIT.PIN=LEVEL")
+        _need("--pin", unit, description.units)
+        model = description.units[unit].model
+        found = (
+            PARTS[model].pins if model in PARTS else catalogue.MODELS[model].pins if model in catalogue.MODELS else ()
+        )
+        kinds = {pin.name: pin.kind for pin in found}
+        inputs = [pin for pin, kind in kinds.items() if kind.reads and kind not in (PinKind.STRAP, PinKind.SERIAL)]
+        if kinds.get(name) is PinKind.STRAP:
+            raise Problem("", "--pin", f"{name} is a strap: give --strap {item}")
+        if name not in inputs:
+            raise Problem("", "--pin", str(catalogue.unknown(f"input of the {model}", name, inputs)))
+        target = f"{unit}.{name}"
+        if any(target in switch.drives for switch in switches.values()):
+            raise Problem("", "--pin", f"a switch of the cell drives {target}: set that in its file")
+        if any(target in wire.to for wire in description.wires):
+            raise Problem("", "--pin", f"a wire leads to {target}: cut it in the cell file first")
+        try:
+            switches[name if alone else f"{unit} {name}"] = Switch.model_validate({"drives": target, "level": value})
+        except ValueError:
+            raise Problem("", "--pin", f"{item!r}: a level is 0, 1, low or high") from None
+    return description.model_copy(update={"switches": switches})
 
 
 def _need(flag: str, unit: str, units: Mapping[str, object]) -> None:

@@ -1,0 +1,129 @@
+"""The files that `run` writes: what stands in their way, how large they will be, and how far they are."""
+
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from errno import ENOSPC
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+if TYPE_CHECKING:
+    from detent.cell.cell import Cell
+    from detent.outputs.signals import Signals, Watch
+    from detent.realtime.target import Target
+    from detent.ticks import Ns
+
+LARGE = 20_000_000  # bytes; larger is told before it is begun
+
+
+class Wanted(NamedTuple):
+    """The files to write, None for one that is not wanted.
+
+    `sr_rate` are the samples a second of a sigrok session, `frequency` and `error` those of the clock of step files.
+    """
+
+    plot: Path | None = None
+    vcd: Path | None = None
+    sr: Path | None = None
+    npz: Path | None = None
+    steps: Path | None = None
+    sr_rate: int | None = None
+    frequency: int = 12_000_000
+    error: str = "1us"
+
+    @property
+    def paths(self) -> list[Path]:
+        """Those that are wanted."""
+        return [path for path in (self.plot, self.vcd, self.sr, self.npz, self.steps) if path is not None]
+
+    def check(self, inputs: Sequence[Path], *, force: bool) -> None:
+        """ValueError for files that cannot be written so, before anything is run."""
+        from detent.outputs.figures import check
+        from detent.outputs.files import check_place
+
+        if self.plot is not None:
+            check(self.plot)
+        if self.sr_rate is not None and (self.sr is None or self.sr_rate < 1):
+            raise ValueError(f"--sr-rate is for --sr, in samples a second, and at least 1, not {self.sr_rate}")
+        if self.frequency < 1:
+            what = "a clock has 1 tick a second or more, like 12000000"
+            raise ValueError(f"--steps-frequency {self.frequency}: {what}")
+        seen: set[Path] = set()
+        for path in self.paths:
+            if path.resolve() in seen:
+                raise ValueError(f"{path}: two outputs cannot go to one file: give each its own")
+            seen.add(path.resolve())
+            if not force:
+                check_place(path, inputs)
+
+
+def write(cell: "Cell", target: "Target", wanted: Wanted) -> None:
+    """Write the files that are wanted. Raises ValueError for a wrong choice, OSError, MotorError."""
+    if not wanted.paths:
+        return
+    from detent.outputs import signals
+
+    described = target.description
+    seen = signals.of_cell(cell, {name: unit.shaft for name, unit in described.units.items()})
+    if wanted.vcd is not None:
+        from detent.outputs import vcd
+
+        with _told(wanted.vcd, vcd.size(seen), seen) as watch:
+            vcd.write(wanted.vcd, seen, watch)
+    if wanted.sr is not None:
+        from detent.outputs import sigrok
+
+        rate = wanted.sr_rate or sigrok.SAMPLERATE
+        with _told(wanted.sr, sigrok.size(seen, rate), seen, compressed=True) as watch:
+            sigrok.write(wanted.sr, seen, samplerate=rate, watch=watch)
+    if wanted.npz is not None:
+        from detent.outputs import arrays
+
+        with _told(wanted.npz, arrays.size(seen), seen, compressed=True) as watch:
+            arrays.write(wanted.npz, seen, watch=watch)
+    if wanted.steps is not None:
+        from detent.outputs import step_file
+        from detent.ticks import parse_duration
+
+        error: Literal["exact"] | Ns = "exact" if wanted.error == "exact" else parse_duration(wanted.error)
+        try:
+            step_file.write(wanted.steps, seen, wanted.frequency, error)
+        except ValueError as problem:
+            raise ValueError(f"--steps-frequency {wanted.frequency}: {problem}; take a faster clock") from None
+    if wanted.plot is not None:
+        from detent.outputs import figures, rotors
+
+        title = described.title or target.name
+        figures.write(wanted.plot, seen, title=title, rotors=rotors.of_cell(cell))
+
+
+@contextmanager
+def _told(path: Path, size: int, signals: "Signals", *, compressed: bool = False) -> "Iterator[Watch]":
+    """Say beforehand how large a large file will be, and then how far it is. OSError if there is no room for it."""
+    from detent.cli.unit import progress
+    from detent.hosts.exchange import Progress
+
+    if size > LARGE:
+        pulses = sum(unit.pulse_count for unit in signals.units)
+        what = f"about {show_size(size)}" + (" before it is compressed" if compressed else "")
+        print(f"Writing {path}: {pulses} pulses, {what}; Ctrl-C leaves no part of it", file=sys.stderr, flush=True)
+        folder = path.resolve().parent
+        room = shutil.disk_usage(folder).free if folder.is_dir() else size
+        if room < size and not compressed:
+            raise OSError(ENOSPC, f"it takes {what}, there is room for {show_size(room)}; run for less", str(path))
+    with progress(f"Writing {path.name}") as bar:
+
+        def watch(done: int, total: int) -> None:
+            bar(Progress(done, total))
+
+        yield watch
+
+
+def show_size(size: int) -> str:
+    """Bytes for people."""
+    for unit in ("bytes", "kB", "MB", "GB", "TB"):
+        if size < 1000 or unit == "TB":
+            break
+        size //= 1000
+    return f"{size} {unit}"

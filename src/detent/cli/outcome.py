@@ -1,0 +1,226 @@
+"""What `run` tells at its end: where everything is, what was said, what was refused, what was lost."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from detent.cell.cell import Cell
+    from detent.cell.conversation import Conversation, Exchange
+    from detent.cell.mechanics import Mechanics
+    from detent.cli.run import Line
+    from detent.controllers.device import Controller, Refused
+    from detent.ticks import Ns
+
+MOST_SHOWN = 40  # lines of a script, or refused ones, that people are shown; --json has all
+SLICE = 60_000_000_000  # ns; a rotor that has long to go is followed so far at a time
+
+
+class Rotor(NamedTuple):
+    """Where a motor's rotor is, where its pulses want it, in steps of the axis, and how many of these it has lost."""
+
+    name: str
+    place: float
+    commanded: float
+    lost: int
+
+
+class Outcome(NamedTuple):
+    """Everything that there is to tell."""
+
+    cell: "Cell"
+    ended: str  # time, idle, endless
+    conversation: "Conversation"
+    sent: "list[Exchange]"
+    unsent: "list[Line]"
+    moving: "list[tuple[int, str]]"
+    motors: list[Rotor]
+
+    @property
+    def refused(self) -> "list[tuple[str, Refused, Exchange | None]]":
+        """What was turned down: the unit, what it says, and the line that it was."""
+        return self.conversation.refused
+
+    @property
+    def scripted(self) -> "list[Exchange]":
+        """What the cell's script sent."""
+        return [exchange for exchange in self.conversation.exchanges if exchange.scripted]
+
+
+def quiet(cell: "Cell") -> Outcome:
+    """Of a cell that nobody has listened to, at its end."""
+    from detent.cell.conversation import Conversation
+
+    return Outcome(cell, "idle", Conversation(), [], [], [], [])
+
+
+def motors(cell: "Cell") -> list[Rotor]:
+    """How the rotors stand. Raises MotorError.
+
+    A rotor that has lost steps stands behind, or before, by whole electrical cycles: four full steps each.
+    """
+    from detent.cell.mechanics import Mechanics
+    from detent.cli.unit import progress
+    from detent.hosts.exchange import Progress
+
+    found = []
+    for name, part in zip(cell.wiring.names, cell.parts, strict=True):
+        if not isinstance(part, Mechanics):
+            continue
+        with progress(f"Following the rotor of {name}") as watch:
+            for at in range(SLICE, cell.now, SLICE):
+                part.catch_up(at)
+                watch(Progress(at, cell.now))
+            found.append(_rotor(name, part, cell.now))
+    return found
+
+
+def _rotor(name: str, motor: "Mechanics", now: "Ns") -> Rotor:
+    place, commanded = motor.place(now), motor.command(now)
+    return Rotor(
+        name, round(place, 3), round(commanded, 3), abs(round(round((commanded - place) / motor.cycle) * motor.cycle))
+    )
+
+
+def facts(told: Outcome) -> dict[str, object]:
+    """Where everything ended, as --json prints it."""
+    cell = told.cell
+    told.conversation.listen()
+    units = {name: _where(unit, cell.now) for name, unit in cell.controllers().items()}
+    result: dict[str, object] = {"time_ns": cell.now, "ended": told.ended, "units": units}
+    answers = told.conversation.answers
+    if told.sent:
+        result["exchanges"] = [{"unit": one.unit, "sent": one.sent, "answers": answers(one)} for one in told.sent]
+    if told.unsent:
+        result["unsent"] = [line._asdict() for line in told.unsent]
+    if told.scripted:
+        result["script"] = [
+            {"at_ns": one.at, "unit": one.unit, "sent": one.sent, "answers": answers(one)} for one in told.scripted
+        ]
+    if told.refused:
+        result["refused"] = [
+            {"at_ns": refused.at, "unit": unit, "line": refused.frame if line is None else line.sent,
+             "reason": refused.reason, "answers": [] if line is None else answers(line)}
+            for unit, refused, line in told.refused
+        ]  # fmt: skip
+    if told.moving:
+        result["moving"] = _moving(told)
+    if told.motors:
+        result["motors"] = {
+            motor.name: {"place": motor.place, "commanded": motor.commanded, "lost": motor.lost}
+            for motor in told.motors
+        }
+    return result
+
+
+def _where(unit: "Controller", now: "Ns") -> dict[str, object]:
+    """Where a unit is; one with several axes names the place of each."""
+    where: dict[str, object] = unit.status(now)._asdict()
+    if len(unit.axes) > 1:
+        places = {axis: unit.status(now, axis) for axis in unit.axes}
+        where["axes"] = {axis: {"position": at.position, "pulses": at.pulses} for axis, at in places.items()}
+    return where
+
+
+def _moving(told: Outcome) -> list[str]:
+    """The axes that are in motion."""
+    names = told.cell.wiring.names
+    return [f"{names[unit]}.{axis}" if axis else names[unit] for unit, axis in told.moving]
+
+
+def show(told: Outcome, written: Sequence[Path]) -> None:
+    """Where everything ended, for people."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from detent.ticks import show_duration
+
+    console = Console(highlight=False)
+    cell, conversation = told.cell, told.conversation
+    conversation.listen()
+    several = len(cell.controllers()) > 1
+    scripted = 0
+    for one in conversation.exchanges:
+        scripted += one.scripted
+        if one.scripted and scripted > MOST_SHOWN:
+            continue
+        when = f"{show_duration(one.at)} " if one.scripted else ""
+        console.print(f"{when}> {one.unit + ': ' if several else ''}{one.sent}", markup=False)
+        for answer in conversation.answers(one):
+            console.print(f"< {answer}", markup=False)
+    if scripted > MOST_SHOWN:
+        console.print(f"... and {scripted - MOST_SHOWN} more lines of the script: --json has them all", markup=False)
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for column in ("unit", "model", "position", "pulses", "state"):
+        table.add_column(column, justify="right" if column in ("position", "pulses") else "left")
+    moving = _moving(told)
+    at_work = []
+    for name, unit in cell.controllers().items():
+        for axis in unit.axes:
+            status = unit.status(cell.now, axis)
+            shown = f"{name}.{axis}" if axis else name
+            table.add_row(shown, unit.model, str(status.position), str(status.pulses), status.state)
+            if shown in moving or status.state in ("running", "homing"):
+                at_work.append(shown)
+    console.print(table)
+    if told.motors:
+        console.print(_rotors(told.motors))
+    time = show_duration(cell.now)
+    match told.ended:
+        case "idle" if at_work:
+            print(f"Nothing more will happen by itself after {time}; {', '.join(at_work)} still at work.")
+            if moving:
+                run_on = "runs" if len(moving) == 1 else "run"
+                print(f"{', '.join(moving)} {run_on} on for ever: stop it, or name --for TIME, like --for 60")
+        case "idle":
+            print(f"Nothing left to do after {time} of virtual time.")
+        case "endless":
+            print(f"Stopped at {time}, in the middle of its work.")
+        case _:
+            print(f"Ran for {time} of virtual time.")
+    for path in written:
+        print(f"Wrote {path}")
+
+
+def _rotors(motors: Sequence[Rotor]) -> object:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for column in ("motor", "rotor at", "commanded", "steps lost"):
+        table.add_column(column, justify="left" if column == "motor" else "right")
+    for motor in motors:
+        table.add_row(motor.name, f"{motor.place:.2f}", f"{motor.commanded:.2f}", str(motor.lost))
+    return table
+
+
+def warn(told: Outcome) -> None:
+    """What went wrong, a line each on stderr."""
+    from detent.ticks import show_duration
+
+    for unit, refused, line in told.refused[:MOST_SHOWN]:
+        answers = [] if line is None else told.conversation.answers(line)
+        answered = f"; it answered {' '.join(answers)}" if answers else "; it answered nothing"
+        what = refused.frame if line is None else line.sent
+        _warn(f"{unit} refused {what!r} at {show_duration(refused.at)}: {refused.reason}{answered}")
+    if len(told.refused) > MOST_SHOWN:
+        _warn(f"... and {len(told.refused) - MOST_SHOWN} more were refused: --json has them all")
+    for motor in told.motors:
+        if motor.lost:
+            _warn(
+                f"{motor.name} lost {motor.lost} steps: its rotor is at {motor.place:.2f} and not at "
+                f"{motor.commanded:.2f}; move slower or with longer ramps, or say --allow-loss"
+            )
+    if told.unsent:
+        lines = ", ".join(repr(line.text) for line in told.unsent[:MOST_SHOWN])
+        _warn(f"the time of --for was over before these were sent: {lines}; give it more")
+    if told.ended == "endless":
+        from detent.cli.run import MOST_INSTANTS
+
+        _warn(
+            f"after {MOST_INSTANTS} events the program looks endless; say how long to run it: --for TIME, like --for 60"
+        )
+
+
+def _warn(text: str) -> None:
+    print(f"detent: {text}", file=sys.stderr)
