@@ -207,6 +207,23 @@ GOOD = "resistance = 2.0, inductance = 3e-3, current = 1, holding_torque = 0.3, 
         (ONE + OWN.format("resistence = 2.0"), "motors.m", "did you mean resistance?"),
         (ONE + OWN.format(GOOD + ", steps = 50.5"), "motors.m", "50.5 steps a turn"),
         (ONE + OWN.format(GOOD + ", steps = 'many'"), "motors.m", "steps is 'many': give a number"),
+        (
+            ONE + MOTOR + "step = 'full'\n[[wires]]\nfrom = 'bar.UO3'\nto = 'm.HALF'",
+            "motors.m.step",
+            "write step = 'half'",
+        ),
+        (ONE + MOTOR + "step = '1/65'", "motors.m.step", "microstepping divides a step by 1 to 64"),
+        (
+            ONE.replace("gs-c200", "supersigma") + MOTOR + "step = '1/8'",
+            "motors.m.step",
+            "a supersigma steps its motor by half",
+        ),
+        (ONE.replace("gs-c200", "dcb-274") + MOTOR + "step = '1/16'", "motors.m.step", "by full, half, 1/4, 1/8"),
+        (
+            ONE + MOTOR + "current = { ramp = 1, slew = 0.6, rest = 0.3 }",
+            "motors.m.current",
+            "wire bar.MOV to m.MOV and bar.RAMP to m.RAMP",
+        ),
         (ONE + OWN.format(GOOD) + "fitted = true", "motors.m", "fitted is for a named motor"),
     ],
 )

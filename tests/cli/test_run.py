@@ -1,6 +1,9 @@
 """The verb run: what it sends, how it ends, what it prints and writes, and what it says to wrong choices."""
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -204,3 +207,178 @@ def test_a_motor_that_breaks_the_equations_ends_in_one_line(
     monkeypatch.setattr("detent.cli.run._Course.run", breaks)
     assert detent("run", "gs-c200") == 1
     assert capsys.readouterr().err.splitlines() == ["detent: the rotor runs away"] * 2
+
+
+# -- what was lost, refused, answered ------------------------------------------------------------------------
+
+ARM = """
+[units.x]
+model = "gs-c200s"
+straps = { CHS = "low" }
+[motors.arm]
+motor = "qsh4218-41-10-035"
+unit = "x"
+supply = 24
+load = { friction = 0.05, viscous = 1e-3 }
+[[script]]
+at = "1 ms"
+send = ["S20", "T5000", "+100"]
+to = "x"
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    file = tmp_path / "arm.toml"
+    file.write_text(ARM)
+    return file
+
+
+def test_a_refused_line_of_a_script_is_told_with_its_time_its_answer_and_status_1(
+    arm: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert detent("run", str(arm)) == 1
+    printed = capsys.readouterr()
+    assert [line for line in printed.out.splitlines() if line[0] in "1<"] == [
+        "1 ms > S20", "< Y", "1 ms > T5000", "< E2", "1 ms > +100", "< Y",
+    ]  # fmt: skip
+    assert "detent: x refused 'T5000' at 12.46 ms: T takes a rate" in printed.err
+    assert "it answered E2" in printed.err
+    assert detent("run", str(arm), "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert [(line["sent"], line["answers"]) for line in found["script"]] == [
+        ("S20", ["Y"]), ("T5000", ["E2"]), ("+100", ["Y"]),
+    ]  # fmt: skip
+    (refused,) = found["refused"]
+    assert (refused["unit"], refused["line"], refused["answers"]) == ("x", "T5000", ["E2"])
+    assert found["motors"]["arm"] == {"place": pytest.approx(100, abs=1), "commanded": 100, "lost": 0}
+
+
+def test_a_refused_line_that_was_sent_ends_with_status_1(capsys: pytest.CaptureFixture[str]) -> None:
+    assert detent("run", "gs-c200", "--send", "A9") == 1
+    assert "gs-c200 refused 'A9'" in capsys.readouterr().err
+
+
+def test_a_motor_that_loses_steps_is_told_and_ends_with_status_1(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A start at 2000 steps/s against a heavy load."""
+    arm.write_text(
+        ARM.replace("friction = 0.05", "inertia = 1e-3, friction = 0.05").replace(
+            '["S20", "T5000", "+100"]', '["S100", "+99"]'
+        )
+    )
+    assert detent("run", str(arm), "--json") == 1
+    told = capsys.readouterr()
+    motor = json.loads(told.out)["motors"]["arm"]
+    assert motor["lost"] > 0
+    assert motor["lost"] % 8 == 0
+    assert motor["lost"] == pytest.approx(abs(motor["commanded"] - motor["place"]), abs=4)
+    assert "arm lost" in told.err
+    assert detent("run", str(arm), "--allow-loss") == 0
+    assert "steps lost" in capsys.readouterr().out
+
+
+def test_status_of_a_drive_that_brakes_can_be_seen(capsys: pytest.CaptureFixture[str]) -> None:
+    """'@ TIME' lets time pass between two lines, '@ idle' until everything rests."""
+    lines = ["move +9000", "@ 300 ms", "stop", "status", "@ idle", "status"]
+    found = result(capsys, "supersigma", *[word for line in lines for word in ("--send", line)])
+    braking, still = [one["answers"] for one in found["exchanges"] if one["answers"]]  # type: ignore[index, attr-defined]
+    assert "moving" in braking[0]
+    assert "moving" not in still[0]
+    assert found["ended"] == "idle"
+
+
+def test_an_axis_that_moves_is_never_done(capsys: pytest.CaptureFixture[str]) -> None:
+    assert detent("run", "dcb-274", "--send", "X", "--send", "M 500") == 0
+    printed = capsys.readouterr().out
+    assert "Nothing left to do" not in printed
+    assert "dcb-274 runs on for ever: stop it, or name --for TIME" in printed
+
+
+def test_for_holds_while_an_answer_is_awaited(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The one that is asked is off; another one's program goes on for ever."""
+    (tmp_path / "endless.gsc").write_text("again: A1\n C1\n j again\n")
+    cell = tmp_path / "cell.toml"
+    off = '[units.off]\nmodel = "gs-c200"\npowered = false\n'
+    cell.write_text('[units.busy]\nmodel = "gs-c200s"\nprogram = "endless.gsc"\n' + off)
+    words = [str(cell), "--for", "50 ms", "--send", "off:F", "--send", "off:V1", "--json"]
+    assert detent("run", *words) == 1
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert found["time_ns"] == 50_000_000
+    assert [one["sent"] for one in found["exchanges"]] == ["F"]
+    assert found["unsent"] == [{"unit": "off", "text": "V1"}]
+    assert "before these were sent: 'V1'" in printed.err
+
+
+def test_an_input_of_a_bare_model_is_held_from_before_the_supply_comes(capsys: pytest.CaptureFixture[str]) -> None:
+    """EOT low: a GS-C200 stands in its limit when it homes, and goes back until HOME opens."""
+    open_ = result(capsys, "gs-c200", "--send", "H-", "--for", "1")
+    held = result(capsys, "gs-c200", "--send", "H-", "--for", "1", "--pin", "EOT=low")
+    assert held["units"] != open_["units"]
+
+
+@pytest.mark.parametrize(
+    ("tokens", "said"),
+    [
+        (["gs-c200", "--pin", "EOTT=low"], "no input of the gs-c200 'EOTT'; did you mean EOT?"),
+        (["gs-c200", "--pin", "EOT=down"], "a level is 0, 1, low or high"),
+        (["gs-c200", "--pin", "CHS=low"], "CHS is a strap: give --strap CHS=low"),
+        (["gs-c200", "--pin", "RDY=low"], "no input of the gs-c200 'RDY'"),
+        ([DRILLING, "--pin", "EOT=low"], "write UNIT.PIN=LEVEL"),
+        ([DRILLING, "--pin", "bar.UI1=low"], "a switch of the cell drives bar.UI1"),
+        (["gs-c200", "--for", "1e22"], "longer than 1000000 years"),
+        (["gs-c200", "--send", "@ soon"], "is no duration"),
+        (["gs-c200", "--sr-rate", "1000"], "--sr-rate is for --sr"),
+        (["gs-c200", "--vcd", "same", "--npz", "./same"], "two outputs cannot go to one file"),
+        (["/dev/zero"], "larger than 16 MiB"),
+    ],
+)
+def test_what_run_is_asked_wrongly(tokens: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert detent("run", *tokens) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize("kind", ["vcd", "sr", "npz", "plot"])
+def test_an_output_replaces_what_a_run_has_made_and_nothing_else_unasked(
+    kind: str, arm: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / ("out.svg" if kind == "plot" else "out")
+    file.write_text("mine")
+    assert detent("run", "gs-c200", f"--{kind}", str(file)) == 2
+    assert "was not made by a run" in capsys.readouterr().err
+    assert file.read_text() == "mine"
+    assert detent("run", "gs-c200", f"--{kind}", str(file), "--force") == 0
+    assert detent("run", "gs-c200", f"--{kind}", str(file)) == 0
+    if kind != "plot":
+        assert detent("run", str(arm), f"--{kind}", str(arm)) == 2
+        assert "is read by this run" in capsys.readouterr().err
+        assert arm.read_text() == ARM
+
+
+def test_a_device_that_is_full_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert detent("run", "gs-c200", "--vcd", "/dev/full") == 1
+    assert capsys.readouterr().err == "detent: /dev/full: cannot write it: No space left on device\n"
+    assert detent("run", "gs-c200", "--vcd", "/nonexistent/x.vcd") == 1
+    assert capsys.readouterr().err == "detent: /nonexistent/x.vcd: cannot write it: No such file or directory\n"
+
+
+def test_a_large_file_is_told_beforehand_and_termination_leaves_no_part_of_it(tmp_path: Path) -> None:
+    words = ["run", "gs-c200s", "--send", "S3", "--send", "R3", "--send", "T3", "--send", "g+", "--for", "200000"]
+    command = [sys.executable, "-c", "import detent.cli; detent.cli.main()", *words, "--vcd", str(tmp_path / "big.vcd")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        said = process.stderr.readline()
+        assert "pulses, about" in said
+        process.terminate()
+        assert process.wait(60) == 128 + signal.SIGTERM
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_units_whose_names_a_vcd_cannot_have_or_makes_alike_get_others(tmp_path: Path) -> None:
+    cell = tmp_path / "cell.toml"
+    cell.write_text("".join(f'[units."{name}"]\nmodel = "gs-c200"\n' for name in ("$end", "a b", "a_b", "$scope")))
+    assert detent("run", str(cell), "--vcd", str(tmp_path / "out.vcd")) == 0
+    scopes = [line.split()[2] for line in (tmp_path / "out.vcd").read_text().splitlines() if line.startswith("$scope")]
+    assert scopes == ["_end", "a_b", "a_b_2", "_scope"]

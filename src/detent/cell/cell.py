@@ -183,6 +183,8 @@ class Cell(Delivery):
         line = self.wiring.line_of[index]
         if line < 0:
             raise ValueError(f"unit {unit!r} is on no line with a host outside: a unit that is its host can send to it")
+        if not self._acting:
+            self._catch_up()
         self._outside.typed(unit, text)
         self.send(line, self.talker(unit).frame(text))
 

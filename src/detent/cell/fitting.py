@@ -7,7 +7,7 @@ from math import inf
 from typing import Any
 
 from detent.cell.contacts import PINS, Contact, Detector
-from detent.cell.description import Description, Motor, Problem, Switch
+from detent.cell.description import Current, Description, Motor, Problem, Switch
 from detent.cell.mechanics import Mechanics
 from detent.motors.damping import Damping, given
 from detent.motors.drive import Currents, Drive
@@ -20,6 +20,13 @@ from detent.motors.rotor import Rig
 from detent.motors.winding import COMMANDED, GRID, Winding, winding
 
 HALF_A_STEP = 0.5
+
+_STEPPINGS = {  # places in a full step that a controller with its own sequence can command
+    "supersigma": (2,),
+    "dcb-274": (1, 2, 4, 8),
+    "bs0610": (1, 2, 4, 8, 16, 32, 64),
+    "bs0710": (1, 2, 4, 8, 16, 32, 64),
+}
 
 
 def motors_by_axis(description: Description) -> dict[tuple[str, str], str]:
@@ -48,6 +55,7 @@ def mechanics(
 ) -> Mechanics:
     """The mechanics of the motor `name`, with the switches that its rotor moves. Raises Problem."""
     entry = description.motors[name]
+    check_stepping(description, name)
     try:
         model = "" if entry.unit is None else description.units[entry.unit].model
         rig = _rig(name, entry, COMMANDED.get(model, ()))
@@ -85,6 +93,42 @@ def rated(name: str, entry: Motor) -> Rated:
     if missing:
         raise MotorError(f"data: a motor of your own needs {', '.join(missing)} too (in SI units: ohm, H, A, Nm)")
     return Rated(name, **given)
+
+
+def check_stepping(description: Description, name: str) -> None:
+    """Raise Problem if a motor's `step` is none that its unit can give, or its wires cannot choose its currents."""
+    entry = description.motors[name]
+    wired = {pin for wire in description.wires for target in wire.to
+             for motor, _, pin in [target.partition(".")] if motor == name}  # fmt: skip
+    wired |= {pin for switch in description.switches.values() for target in switch.drives
+              for motor, _, pin in [target.partition(".")] if motor == name}  # fmt: skip
+    key = f"motors.{name}"
+    try:
+        places = winding(entry.step).steps
+    except MotorError as error:
+        raise Problem(description.file, f"{key}.step", str(error)) from None
+    if "HALF" in wired and places != 2:
+        what = (
+            f"{entry.step}: with a wire to HALF the drive is half-stepped, and 0 there makes two half steps of a pulse"
+        )
+        raise Problem(description.file, f"{key}.step", f"{what}: write step = 'half', or cut the wire")
+    model = "" if entry.unit is None else description.units[entry.unit].model
+    can = _STEPPINGS.get(model)
+    if "step" in entry.model_fields_set and can is not None and places not in can:
+        steppings = ", ".join(f"1/{each}" if each > 2 else {1: "full", 2: "half"}[each] for each in can)
+        raise Problem(description.file, f"{key}.step", f"{entry.step}: a {model} steps its motor by {steppings}")
+    current = entry.current
+    if isinstance(current, Current) and current.ramp:
+        needed = {
+            "MOV": current.rest != current.ramp or current.slew != current.ramp,
+            "RAMP": current.slew != current.ramp,
+        }
+        missing = [pin for pin, is_needed in needed.items() if is_needed and pin not in wired]
+        if missing:
+            unit = entry.unit or "UNIT"
+            wires = " and ".join(f"{unit}.{pin} to {name}.{pin}" for pin in missing)
+            what = f"ramp, slew and rest are chosen by the pins MOV and RAMP: wire {wires}, or give run, hold and after"
+            raise Problem(description.file, f"{key}.current", what)
 
 
 def check_names(description: Description, taken: Sequence[str]) -> None:

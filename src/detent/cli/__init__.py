@@ -1,8 +1,11 @@
 """The command `detent`: one verb a module, each imported only when it is used."""
 
+import os
+import signal
 import sys
+import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cyclopts import App
@@ -68,6 +71,7 @@ def main(tokens: Sequence[str] | None = None) -> None:
     from detent.extras import MissingExtra
 
     given = list(sys.argv[1:] if tokens is None else tokens)
+    before = _hear_termination()
     try:
         application(given[0] if given else "")(given)
     except CycloptsError:
@@ -75,5 +79,22 @@ def main(tokens: Sequence[str] | None = None) -> None:
     except MissingExtra as error:
         print(f"detent: {error}", file=sys.stderr)
         sys.exit(ASKED_WRONGLY)
+    except BrokenPipeError:  # whoever read what is printed has had enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(FAILED)
     except KeyboardInterrupt:
         sys.exit(130)
+    finally:
+        if before is not None:
+            signal.signal(signal.SIGTERM, before)
+
+
+def _hear_termination() -> Any:
+    """SIGTERM ends a verb as Ctrl-C does, so that it tidies up: no temporary file stays. Returns how it was before."""
+    if threading.current_thread() is not threading.main_thread():
+        return None
+
+    def terminated(number: int, _: object) -> None:
+        sys.exit(128 + number)
+
+    return signal.signal(signal.SIGTERM, terminated)

@@ -145,7 +145,7 @@ def show(told: Outcome, written: Sequence[Path]) -> None:
         scripted += one.scripted
         if one.scripted and scripted > MOST_SHOWN:
             continue
-        when = f"{show_duration(one.at)} " if one.scripted else ""
+        when = f"{show_duration(one.at) if one.at else '0 s'} " if one.scripted else ""
         console.print(f"{when}> {one.unit + ': ' if several else ''}{one.sent}", markup=False)
         for answer in conversation.answers(one):
             console.print(f"< {answer}", markup=False)

@@ -91,7 +91,6 @@ def run(
     from detent.cli import FAILED, exports, outcome
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
-    from detent.extras import MissingExtra
     from detent.motors.motor import MotorError
     from detent.ticks import parse_duration, show_duration
 
@@ -107,8 +106,6 @@ def run(
         lines = [_addressed(cell, text) for text in send]
         if until is not None and until > cell.latest:
             raise Problem("", "--for", f"with a motor a cell runs for {show_duration(cell.latest)} at most")
-    except MissingExtra as error:
-        failed(error)
     except ValueError as error:
         asked_wrongly(error)
     course = _Course(cell, conversation, until)
@@ -243,6 +240,8 @@ class _Course:
         after = cell.next_event()
         if self._until is not None and cell.now >= self._until and after is not None and after > self._until:
             return False
+        cell.run_to(cell.now)  # what the script does in this instant comes first
+        conversation.listen()
         wire.take()
         conversation.scripted = False
         cell.type(line.unit, line.text)
