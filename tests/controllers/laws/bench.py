@@ -71,6 +71,7 @@ class Travel:
 
     def __init__(self) -> None:
         self.motion: MotionStarted | None = None
+        self.ends = 0  # motions that came to their own end
         self._rest = 0  # the shaft at rest, or at pulse 0 of the motion under way
         self._pulses = 0  # given before pulse 1 of the motion under way
 
@@ -85,6 +86,7 @@ class Travel:
             self._rest, self.motion = item.shaft, item
         else:
             assert self.motion is not None, "what does not move cannot end"
+            self.ends += isinstance(item, MotionEnded)
             due = self.motion.train.steps_by(item.at)  # the last of them may have been held
             assert item.last in (due, due - 1), f"a motion ends with pulse {item.last}, and {due} were due"
             self._rest += self.motion.direction * item.last

@@ -181,7 +181,11 @@ class Board:
         def steps(bench: Bench, rate: float) -> int:
             return 0 if self._hard else ramp_steps(rate, *ramp(bench, axis))
 
-        return Limit(pin, axis, direction, lambda bench: bench.level(pin) == LOW, steps)
+        def closed(bench: Bench) -> bool:  # in E mode a soft limit is ignored (page 26)
+            ignored = not self._hard and bench.device.status(bench.now).state == "direct"
+            return bench.level(pin) == LOW and not ignored
+
+        return Limit(pin, axis, direction, closed, steps)
 
 
 def hears(bench: Bench) -> bool:

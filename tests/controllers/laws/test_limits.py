@@ -23,10 +23,13 @@ class Guard(Watch):
         self._place = 0  # where the axis was then
         self._rate = 0.0
         self._allowed = 0
+        self._ends = 0  # motions of the axis that were over when it was met
         self._was = 0, 0.0  # the direction and rate before what happens now
 
     def before(self, bench: Bench) -> None:
         travel = bench.travels[self.limit.axis]
+        if self._on_its_way and not self._closed:  # it has opened again, and something new comes
+            self._on_its_way, self._allowed, self._place = 0, 0, self._where(bench)
         towards = travel.direction if self.limit.direction in (0, travel.direction) else 0
         towards = towards if self.limit.met(bench) else 0
         self._was = towards, travel.rate(bench.now)
@@ -37,7 +40,7 @@ class Guard(Watch):
         if self._on_its_way:
             self._allowed = max(self._allowed, limit.steps(bench, self._rate))
             self._judge(bench)
-            if travel.direction != self._on_its_way or (limit.gate and not closed):
+            if travel.direction != self._on_its_way or travel.ends != self._ends or (limit.gate and not closed):
                 self._on_its_way, self._allowed, self._place = 0, 0, self._where(bench)
         elif closed and self._closed and limit.barred:
             self._judge(bench)
@@ -48,6 +51,7 @@ class Guard(Watch):
             self._on_its_way, self._rate = self._was
             if self._on_its_way:
                 self.met += 1
+                self._ends = travel.ends
                 self._allowed = limit.steps(bench, self._rate)
                 if travel.direction != self._on_its_way:
                     self._on_its_way = self._allowed = 0
