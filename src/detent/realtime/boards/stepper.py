@@ -247,7 +247,11 @@ class Stepper:
     def _send(self, span: _Span, runs: Runs, upto: int, wall: WallNs) -> None:
         core, channel = self._core, self._channel(span.direction)
         up = True if len(self._channels) > 1 else span.direction == channel.sign
-        room = core.queue.room(core.clock.tick_at(wall) - core.ticks(UNSURE)) - SPARE
+        now = core.clock.tick_at(wall)
+        room = core.queue.room(now - core.ticks(UNSURE)) - SPARE
+        due = runs.due()
+        if 2 * room < core.queue.size and due is not None and due - now > core.ticks(core.setup.lead) // 2:
+            return  # the queue is filling up: what waits a little makes longer runs
         while span.next <= upto and room > 0:
             run = runs.one(upto)
             self._put(channel, run, up)

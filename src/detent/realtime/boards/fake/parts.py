@@ -32,6 +32,7 @@ class Stepper(Part):
         self.next_step = 0
         self.earliest = 0  # of the next edge: when the pulse before and the time after it are over
         self.going_up = self.next_up = False
+        self.counting_up = False  # the direction of the run that is loaded
         self.need_reset = False
         self.stop_signal: Trsync | None = None
         self._timer: list[bool] = [False]
@@ -68,6 +69,7 @@ class Stepper(Part):
                 raise Shutdown("Stepper too far in past")
             at = self.earliest
         if move.turn:
+            self.counting_up = not self.counting_up
             board.machine.drive(self.dir, not board.machine.outputs[self.dir], board.now)
             if was_active:
                 at = max(at, board.now + self.pulse)
@@ -75,7 +77,7 @@ class Stepper(Part):
 
     def _edge(self, tick: int) -> None:
         board = self.board
-        self.position += 1 if board.machine.outputs[self.dir] else -1
+        self.position += 1 if self.counting_up else -1
         self.count -= 1
         over = tick + self.pulse
         self.earliest = over + self.pulse
@@ -121,7 +123,7 @@ class Stepper(Part):
             self.board.free_move()
         self.queue.clear()
         self.count, self.earliest = 0, 0
-        self.going_up = self.next_up = False
+        self.going_up = self.next_up = self.counting_up = False
         self.need_reset = True
         self.board.machine.drive(self.dir, False, self.board.now)
 

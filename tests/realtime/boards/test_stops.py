@@ -1,0 +1,228 @@
+"""Stops in the firmware: at the step that closed the switch, and counts that stay equal whatever happens."""
+
+from random import Random
+
+import pytest
+from tests.realtime.boards.bench import Bench, bench
+
+from detent.axis import MotionStarted
+from detent.ramps import constant_acceleration
+from detent.realtime.boards.events import CountDiffers, InputChanged, Stopped
+from detent.realtime.boards.fake.machine import MachineSwitch
+from detent.ticks import MS, SECOND, US
+
+LIMIT = MachineSwitch("slide", "gpio10", 500, 1 << 30, inside=False)  # EOT: low beyond
+
+
+def move(made: Bench, steps: int | None, direction: int, rate: int = 1000) -> MotionStarted:
+    made.boards.stops["slide"].arm({"EOT": False}, made.now)
+    made.move(constant_acceleration.move(rate, rate, 1, steps).train, direction)
+    [started] = made.told["slide"]
+    assert isinstance(started, MotionStarted)
+    return started
+
+
+def taken_back(made: Bench, stop: Stopped, started: MotionStarted) -> None:
+    """What the cell does: it is taken back to the stop, cut there, and the axis stands where the firmware counts."""
+    axis = made.axes["slide"]
+    at = min(max(stop.at, started.at), made.now)
+    given = (stop.shaft - started.shaft) * started.direction
+    # the instant lies between the pulses that the firmware has counted and the next
+    assert started.train.steps_by(at) == given
+    made.axes["slide"].train = started.train
+    axis.cut(at)
+    made.told["slide"].clear()
+    made.boards.steppers["slide"].rewind(stop.shaft)
+    assert axis.shaft == stop.shaft
+
+
+@pytest.mark.parametrize("rate", [10, 200, 1000, 5000])
+def test_it_stops_on_the_step_that_closed_the_switch(rate: int) -> None:
+    edge = 500 if rate > 50 else 6
+    made = bench(MachineSwitch("slide", "gpio10", edge, 1 << 30, inside=False))
+    started = move(made, None, 1, rate)
+    made.until(lambda: bool(made.of(Stopped)), 60 * SECOND)
+    [stop] = made.of(Stopped)
+    assert (stop.stepper, stop.input, stop.level, stop.present) == ("slide", "EOT", False, False)
+    assert stop.shaft == made.machine.axes["slide"].position == edge
+    # two samples of 50 us behind the pulse at most
+    pulse = started.train.time_of(edge)
+    assert 0 <= stop.edge - pulse <= 55 * US
+    assert stop.edge <= stop.at <= stop.edge + 51 * US
+    taken_back(made, stop, started)
+    made.run(200 * MS)
+    assert made.machine.axes["slide"].position == edge
+    assert not made.of(CountDiffers)
+
+
+def test_and_goes_away_from_it_again() -> None:
+    made = bench(LIMIT)
+    started = move(made, None, 1)
+    made.until(lambda: bool(made.of(Stopped)))
+    taken_back(made, made.of(Stopped)[0], started)
+    made.boards.stops["slide"].disarm()
+    made.move(constant_acceleration.move(1000, 1000, 1, 300).train, -1)
+    made.rest()
+    assert made.machine.axes["slide"].position == made.axes["slide"].shaft == 200
+    # the switch opened while nothing was armed: told as any other input
+    assert [event.level for event in made.of(InputChanged)] == [True]
+    assert not made.of(CountDiffers)
+
+
+def test_a_switch_that_is_closed_already_lets_no_step_pass() -> None:
+    made = bench(MachineSwitch("slide", "gpio10", 0, 1 << 30, inside=False))
+    assert made.boards.master.inputs == {"EOT": False, "HOME": True}
+    started = move(made, None, 1, 5000)
+    made.until(lambda: bool(made.of(Stopped)))
+    [stop] = made.of(Stopped)
+    assert stop.shaft == 0 == made.machine.axes["slide"].position
+    assert started.train.steps_by(stop.at) == 0
+
+
+def test_arming_late_holds_the_pulses_back() -> None:
+    """A stop that is armed for the past comes into force now: no pulse leaves before it."""
+    made = bench(MachineSwitch("slide", "gpio10", 0, 1 << 30, inside=False))
+    move(made, 400, 1, 2000)
+    made.turn(made.wall + 28 * MS)  # the host was busy meanwhile
+    assert made.boards.steppers["slide"].lag > 1 * MS
+    made.until(lambda: bool(made.of(Stopped)))
+    assert made.of(Stopped)[0].shaft == made.machine.axes["slide"].position == 0
+
+
+def test_what_is_armed_stays_armed_while_it_is_armed_again() -> None:
+    """No gap and no new trigger: the tail of a motion is guarded while the next is armed."""
+    made = bench(LIMIT)
+    move(made, 495, 1)
+    made.until(lambda: not made.axes["slide"].moving)
+    before = len(made.board.log)
+    made.boards.stops["slide"].arm({"EOT": False, "HOME": False}, made.now)
+    made.turn(made.wall)
+    made.run(5 * MS)
+    since = [(name, values.get("oid")) for _, name, values in made.board.log[before:]]
+    assert [name for name, _ in since if name.startswith(("trsync", "endstop_home"))] == ["endstop_home"]
+    made.move(constant_acceleration.move(1000, 1000, 1, 100).train, 1)
+    made.until(lambda: bool(made.of(Stopped)))
+    assert made.of(Stopped)[0].shaft == 500
+
+
+def test_disarmed_it_stops_nothing() -> None:
+    made = bench(LIMIT)
+    move(made, 600, 1)
+    made.run(100 * MS)
+    made.boards.stops["slide"].disarm()
+    made.rest()
+    assert not made.of(Stopped)
+    assert made.machine.axes["slide"].position == 600
+    # and the trigger is quiet: a board at rest is not talked at
+    reports = [m for m in made.board.log if m[1] == "trsync_start"]
+    assert reports[-1][2]["report_ticks"] == 0
+
+
+def test_a_trigger_on_its_way_while_it_is_disarmed_is_told() -> None:
+    """The switch closes, and the host disarms before it has heard of it: the stop comes all the same."""
+    for delay in (0, 1, 2, 3, 5):
+        made = bench(LIMIT, port={"delay": 2 * MS})
+        move(made, None, 1)
+        made.until(lambda made=made: made.machine.axes["slide"].position >= 500)
+        made.run(delay * MS)
+        if not made.of(Stopped):
+            made.boards.stops["slide"].disarm()
+        made.until(lambda made=made: bool(made.of(Stopped)))
+        assert made.of(Stopped)[0].shaft == 500
+
+
+def test_a_glitch_shorter_than_two_samples_stops_nothing_and_a_longer_one_is_told_as_over() -> None:
+    for length, stops in ((40, False), (400, True)):
+        made = bench()
+        made.machine.set("gpio10", True, made.board.now)
+        made.run(10 * MS)
+        move(made, 1000, 1)
+        made.run(300 * MS)
+        board = made.board
+        board.at(board.now + 1000, lambda tick, made=made: made.machine.set("gpio10", False, tick))
+        over = board.now + 1000 + length * board.frequency // 1_000_000
+        board.at(over, lambda tick, made=made: made.machine.set("gpio10", True, tick))
+        made.run(60 * MS)
+        assert [stop.present for stop in made.of(Stopped)] == ([True] if stops else [])
+        assert not made.of(InputChanged)
+
+
+def test_the_button_report_of_an_armed_level_is_left_to_the_trigger() -> None:
+    made = bench(LIMIT)
+    started = move(made, None, 1)
+    made.until(lambda: bool(made.of(Stopped)))
+    taken_back(made, made.of(Stopped)[0], started)
+    made.run(100 * MS)
+    assert not made.of(InputChanged)
+    assert made.boards.master.inputs["EOT"] is False
+
+
+def prove_stop(seed: int) -> None:
+    """Homings and limits at any rate, lead and queue: the count is the firmware's, no step behind the stop."""
+    random = Random(seed)
+    lead = random.choice([12, 15, 30, 50])
+    edge, rate = random.randrange(1, 400), random.choice([20, 100, 170, 900, 2500, 5000])
+    if rate < 100:
+        edge = min(edge, 30)
+    made = bench(
+        MachineSwitch("slide", "gpio10", edge, 1 << 30, inside=False), lead=lead * MS,
+        board={"seed": seed, "moves": random.choice([48, 512])},
+        port={"drift": random.uniform(-100, 100), "delay": random.choice([50, 300, 1000]) * US},
+    )  # fmt: skip
+    started = move(made, random.choice([None, edge + 1, edge + 50]), 1, rate)
+    made.until(lambda: bool(made.of(Stopped)), 60 * SECOND)
+    [stop] = made.of(Stopped)
+    assert stop.shaft == edge == made.machine.axes["slide"].position
+    if made.axes["slide"].moving:
+        taken_back(made, stop, started)
+    else:  # the rest of its pulses were told already: it is taken back from rest
+        made.axes["slide"].shaft = stop.shaft
+        made.boards.steppers["slide"].rewind(stop.shaft)
+    last = made.machine.steps[-1][0]
+    made.run(2 * lead * MS)
+    assert made.machine.steps[-1][0] == last
+    made.boards.stops["slide"].arm({"EOT": True}, made.now)  # back until it opens
+    made.move(constant_acceleration.move(rate, rate, 1, None).train, -1)
+    made.until(lambda: len(made.of(Stopped)) == 2, 10 * SECOND)
+    assert made.of(Stopped)[1].shaft == edge - 1 == made.machine.axes["slide"].position
+    assert not made.of(CountDiffers)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_random_stops(seed: int) -> None:
+    prove_stop(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(5))
+def test_five_hundred_random_stops(part: int) -> None:
+    for seed in range(100 * part, 100 * part + 100):
+        prove_stop(seed)
+
+
+def test_a_lost_report_is_followed_by_another() -> None:
+    """What a board sends is not repeated by the link: a trigger whose word was lost is heard of a report later."""
+    dropped: list[bytes] = []
+
+    def spoil(data: bytes, to_board: bool) -> list[bytes]:
+        if not to_board and armed and made.board.machine.axes["slide"].position >= 500 and len(dropped) < 6:
+            dropped.append(data)
+            return []
+        return [data]
+
+    armed = False
+    made = bench(LIMIT, port={"spoil": spoil})
+    armed = True
+    move(made, None, 1)
+    made.until(lambda: bool(made.of(Stopped)))
+    assert len(dropped) == 6
+    assert made.of(Stopped)[0].shaft == 500
+
+
+def test_the_host_hears_of_it_within_the_lead_and_some_ms() -> None:
+    """The host hears of a stop within a few ms of it, of its own time."""
+    made = bench(LIMIT, port={"delay": 100 * US})
+    move(made, None, 1)
+    made.until(lambda: bool(made.of(Stopped)))
+    [stop] = made.of(Stopped)
+    assert made.now - stop.at < 40 * MS
