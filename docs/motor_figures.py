@@ -62,7 +62,7 @@ def torque_curve(folder: Path) -> None:
     fit = fitted("qsh4218-41-10-035").motor
     rig = Rig(fit, Drive(24, 1.0, HALF))
     points = solve(fit, rig.drive, [50, *range(250, 5250, 250)])
-    motor_figures.write_curve(folder / "motor-torque.png", rig, points, CURVES[fit.name])
+    motor_figures.write_curve(folder / "motor-torque.png", fit, rig.drive, points, CURVES[fit.name])
 
 
 def closed_loop(folder: Path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from detent.motors import engine, kernel
+from detent.motors.curve import check_rate
 from detent.motors.drive import Drive
 from detent.motors.motor import Motor, MotorError, need
 from detent.motors.rotor import Rig
@@ -19,6 +20,7 @@ from detent.motors.rotor import Rig
 Floats = npt.NDArray[np.float64]
 
 MICROSECOND = 1e-6
+MOST_ROWS = 10_000_000
 
 
 class Waveform(NamedTuple):
@@ -127,7 +129,14 @@ def inspect(
     blanking: float = 2e-6,
 ) -> Waveform:
     """The currents of a switching chopper at `rate` full steps/s, the rotor `load_angle` el. degrees behind."""
-    need("chopper", 0, 1e6, open_=True, rate=rate)
+    check_rate(rate)
+    if not 1 <= cycles <= 1000:
+        raise MotorError(f"{cycles!r} cycles: look at 1 to 1000")
+    if cycles * 4e6 / rate > MOST_ROWS:
+        raise MotorError(
+            f"{cycles} electrical cycles at {rate:g} steps/s are {cycles * 4 / rate:.3g} s, a row each microsecond: "
+            f"more than {MOST_ROWS} rows; look at a higher rate"
+        )
     need("chopper", 1e-6, 1e-3, off_time=off_time, blanking=blanking)
     if decay not in ("slow", "mixed", "fast"):
         raise MotorError(f"no decay {decay!r}: slow, mixed or fast")

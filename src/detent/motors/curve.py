@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from detent.motors import engine, kernel
+from detent.motors.damping import Damping
 from detent.motors.drive import Drive
 from detent.motors.load import NO_LOAD, Load
 from detent.motors.motor import Motor, MotorError
@@ -25,7 +26,9 @@ Floats = npt.NDArray[np.float64]
 ANGLES = 37  # looked at in the half turn where the greatest torque lies, before the golden section
 GOLDEN = 0.6180339887498949
 PRECISION = 1e-3  # rad, of the load angle
-MOST_RATE = 1e6  # full steps/s: beyond this no step motor turns
+LEAST_RATE, MOST_RATE = 0.01, 1e6  # full steps/s: within these a step motor turns
+STANDING = 5.0  # full steps/s: slower the torque is the same, as nothing but the resistance is left
+MOST_WORK = 2e8  # substeps of one curve or one search for start rates
 
 
 class PullOut(NamedTuple):
@@ -51,6 +54,8 @@ def mean_torque(rate, angle, par, table_a, table_b, mode, level, settle, cycles,
     pitch = float(par[11])
     offset = float(par[12])
     gain = float(par[18])
+    fall = float(par[21])
+    glide = float(par[22])
     w = rate / teeth
     cycle = table_a.shape[1]
     h = pitch / rate / per_place
@@ -68,7 +73,12 @@ def mean_torque(rate, angle, par, table_a, table_b, mode, level, settle, cycles,
         at = n % cycle
         want_a = amps * float(table_a[0, at])
         want_b = amps * float(table_b[0, at])
+        before = (n - 1) % cycle
         for k in range(per_place):
+            if glide > 0.0:
+                part = 1.0 - (k + 0.5) / per_place
+                want_a = amps * (float(table_a[0, at]) + part * (float(table_a[0, before]) - float(table_a[0, at])))
+                want_b = amps * (float(table_b[0, at]) + part * (float(table_b[0, before]) - float(table_b[0, at])))
             x = offset + (n + (k + 0.5) / per_place - 0.5) * pitch - angle
             turns = float(floor(x * 0.6366197723675814 + 0.5))
             y = (x - turns * 1.5707963267341256) - turns * 6.0771005065061922e-11
@@ -94,15 +104,24 @@ def mean_torque(rate, angle, par, table_a, table_b, mode, level, settle, cycles,
                 most_a = volts
                 least_b = -volts
                 most_b = volts
-                if mode == 1:
-                    if want_a >= 0.0:
-                        least_a = 0.0
-                    if want_a <= 0.0:
-                        most_a = 0.0
-                    if want_b >= 0.0:
-                        least_b = 0.0
-                    if want_b <= 0.0:
-                        most_b = 0.0
+                if mode == 1 or mode == 3:
+                    lowest = 0.0
+                    if mode == 3:
+                        lowest = fall * volts
+                    if want_a > 0.0:
+                        least_a = lowest
+                    elif want_a < 0.0:
+                        most_a = -lowest
+                    else:
+                        least_a = min(lowest, 0.0)
+                        most_a = -least_a
+                    if want_b > 0.0:
+                        least_b = lowest
+                    elif want_b < 0.0:
+                        most_b = -lowest
+                    else:
+                        least_b = min(lowest, 0.0)
+                        most_b = -least_b
                 va = min(max(va, least_a), most_a)
                 vb = min(max(vb, least_b), most_b)
             ua = va - ea - r * ia
@@ -121,8 +140,8 @@ def pull_out(motor: Motor, drive: Drive, rate: float, *, level: float = 1.0) -> 
 
     The motor's own friction is subtracted, a load's is not: this is the torque that is there for it.
     """
-    if not 0 < rate <= MOST_RATE:
-        raise MotorError(f"a speed is above 0 and at most {MOST_RATE:g} full steps/s, not {rate!r}")
+    check_rate(rate)
+    asked, rate = rate, max(rate, min(STANDING, 0.006 * motor.resistance / motor.real_inductance))
     # an inertia is not needed here, and not every maker gives one
     rig = Rig(motor if motor.inertia is not None else motor.changed(inertia=1e-5), drive)
     turning = rate * pi / 2
@@ -160,13 +179,19 @@ def pull_out(motor: Motor, drive: Drive, rate: float, *, level: float = 1.0) -> 
             outer = low + GOLDEN * (high - low)
             at_outer = torque(outer)
     best = (low + high) / 2
-    own = motor.viscous * turning / motor.teeth
-    return PullOut(rate, torque(best) - own, degrees(best))
+    own = motor.viscous * asked * pi / 2 / motor.teeth
+    return PullOut(asked, torque(best) - own, degrees(best))
 
 
 def torque_curve(motor: Motor, drive: Drive, rates: Iterable[float], *, level: float = 1.0) -> list[PullOut]:
     """The pull-out torque at each of these speeds (full steps/s)."""
     return [pull_out(motor, drive, rate, level=level) for rate in rates]
+
+
+def check_rate(rate: float) -> None:
+    """Raise MotorError for a speed (full steps/s) that is none."""
+    if isinstance(rate, bool | str) or not LEAST_RATE <= rate <= MOST_RATE:
+        raise MotorError(f"a speed is {LEAST_RATE:g} to {MOST_RATE:g} full steps/s, not {rate!r}")
 
 
 class Starts(NamedTuple):
@@ -204,6 +229,13 @@ class Starts(NamedTuple):
 
 def starts(rig: Rig, rates: Sequence[float], *, steps: int = 200) -> Starts:
     """Try to start into each rate for `steps` full steps. The end, without a ramp down, does not count."""
+    if not 1 <= steps <= 100_000:
+        raise MotorError(f"{steps!r} steps: try a start with 1 to 100000")
+    for rate in rates:
+        check_rate(rate)
+    work = sum(steps / rate * 1e9 / rig.substep for rate in rates)
+    if work > MOST_WORK:
+        raise MotorError(f"starts at {min(rates):g} steps/s take too long to be looked at: try higher rates")
     started = []
     for rate in rates:
         per_pulse = SECOND / (rate * rig.drive.winding.steps)
@@ -212,9 +244,11 @@ def starts(rig: Rig, rates: Sequence[float], *, steps: int = 200) -> Starts:
     return Starts(tuple(rates), tuple(started))
 
 
-def pull_in_rate(motor: Motor, drive: Drive, load: Load = NO_LOAD, *, steps: int = 200) -> Starts:
+def pull_in_rate(
+    motor: Motor, drive: Drive, load: Load = NO_LOAD, *, steps: int = 200, damping: Damping | None = None
+) -> Starts:
     """The start-stop rates in octaves of a twelfth, from 20 full steps/s to where nothing starts any more."""
-    rig = Rig(motor, replace(drive), load)
+    rig = Rig(motor, replace(drive), load, damping=damping)
     rates: list[float] = []
     good: list[bool] = []
     rate, misses = 20.0, 0

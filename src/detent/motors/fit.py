@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from detent.motors.curve import GOLDEN, torque_curve
+from detent.motors.curve import GOLDEN, MOST_RATE, pull_out, torque_curve
 from detent.motors.drive import Drive
 from detent.motors.motor import Motor, MotorError
 from detent.motors.named import CURVES, motor
@@ -19,16 +19,52 @@ from detent.motors.winding import winding
 LEAST_FACTOR, MOST_FACTOR = 1.0, 2.5
 PRECISION = 0.005
 LOOKS = 7
+HARDLY = 0.01  # of the holding torque: an rms that is so little more fits as well
+AMBIGUOUS = 0.06
+POOR = 0.08
 
 Point = tuple[float, float]
 
 
 class Fit(NamedTuple):
-    """The fitted motor, and how far its curve is from the points: rms, as a part of the holding torque."""
+    """The fitted motor, how far its curve is from the points (parts of the holding torque), and how far it reaches."""
 
     motor: Motor
     rms: float
     sheet_rms: float  # of the sheet alone
+    low: float = 0.0  # full steps/s: the speeds that were measured, and for which it holds
+    high: float = 0.0
+    factors: tuple[float, float] = (
+        1.0,
+        1.0,
+    )  # on the inductance, that fit hardly worse (`HARDLY`), with their friction
+    spread: float = 0.0  # of the torque that those give at twice the highest speed
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether the points leave open what the motor gives beyond them."""
+        return self.spread > AMBIGUOUS
+
+    @property
+    def quality(self) -> str:
+        """In words, how near it comes."""
+        words = f"{self.rms:.1%} of the holding torque off (rms; the data alone {self.sheet_rms:.1%})"
+        if self.rms > POOR:
+            return f"POOR: {words}: check the data, the units, the wiring, and the drive it was measured with"
+        return words
+
+    @property
+    def reach(self) -> str:
+        """In words, for how much it holds."""
+        words = f"{self.quality}; holds from {self.low:g} to {self.high:g} full steps/s, where it was measured"
+        if self.ambiguous:
+            low, high = self.factors
+            words += (
+                f"; AMBIGUOUS: with the inductance times {low:.2f} to {high:.2f} the points are met as well, and the "
+                f"torque at {2 * self.high:g} full steps/s differs by {self.spread:.0%} of the holding torque: measure "
+                "at higher speeds"
+            )
+        return words
 
 
 def fit_from_curve(motor: Motor, drive: Drive, points: Sequence[Point], *, friction: bool = True) -> Fit:
@@ -62,7 +98,22 @@ def fit_from_curve(motor: Motor, drive: Drive, points: Sequence[Point], *, frict
     best = best_of([LEAST_FACTOR + (MOST_FACTOR - LEAST_FACTOR) * k / (LOOKS - 1) for k in range(LOOKS)],
                    lambda factor: residual(factor)[0])  # fmt: skip
     rms, viscous = residual(best)
-    return Fit(plain.changed(inductance_factor=best, viscous=viscous), rms, residual(1.0, 0.0)[0])
+    made = plain.changed(inductance_factor=best, viscous=viscous)
+    factors, torques_beyond = [best], [_beyond(made, drive, points[-1][0])]
+    for k in range(2 * LOOKS):
+        factor = LEAST_FACTOR + (MOST_FACTOR - LEAST_FACTOR) * k / (2 * LOOKS - 1)
+        other, its_viscous = residual(factor)
+        if other < rms + HARDLY:
+            factors.append(factor)
+            candidate = plain.changed(inductance_factor=factor, viscous=its_viscous)
+            torques_beyond.append(_beyond(candidate, drive, points[-1][0]))
+    spread = (max(torques_beyond) - min(torques_beyond)) / motor.holding_torque
+    return Fit(made, rms, residual(1.0, 0.0)[0], points[0][0], points[-1][0], (min(factors), max(factors)), spread)
+
+
+def _beyond(motor: Motor, drive: Drive, rate: float) -> float:
+    """The torque at twice that speed; what is no torque any more is 0."""
+    return max(pull_out(motor, drive, min(2 * rate, MOST_RATE)).torque, 0.0)
 
 
 def best_of(looks: Sequence[float], cost) -> float:  # type: ignore[no-untyped-def]

@@ -1,6 +1,8 @@
 """What hangs on the shaft: inertia, friction, and a torque that may depend on time and place."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import isfinite
 from typing import NamedTuple
 
@@ -24,6 +26,7 @@ class Profile(NamedTuple):
 
 
 NONE = Profile(0.0, 1.0, (0.0,))
+UNEVEN = 1000  # places of a profile whose points are not evenly apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,3 +71,53 @@ class Load(Shared):
 
 
 NO_LOAD = Load()
+MOST_POINTS = 100_000
+
+
+def profile(points: Sequence[tuple[float, float]]) -> Profile:
+    """Straight lines through these points, put on even places: exactly, where they are even; else 1000 of them."""
+    if len(points) < 2 or any(not isfinite(value) for point in points for value in point):
+        raise MotorError("a load that changes: give at least two points, of finite numbers")
+    places = [place for place, _ in points]
+    steps = [after - before for before, after in pairwise(places)]
+    if min(steps) <= 0:
+        raise MotorError("a load that changes: times or places rise from point to point")
+    span = places[-1] - places[0]
+    if max(steps) - min(steps) < 1e-9 * span:
+        return Profile(places[0], span / len(steps), tuple(torque for _, torque in points))
+    values, k = [], 0
+    for n in range(UNEVEN):
+        at = places[0] + span * n / (UNEVEN - 1)
+        while k < len(steps) - 1 and at > places[k + 1]:
+            k += 1
+        part = (at - places[k]) / steps[k]
+        values.append(points[k][1] + part * (points[k + 1][1] - points[k][1]))
+    return Profile(places[0], span / (UNEVEN - 1), tuple(values))
+
+
+def read_profile(load: Load, text: str, file: str, radians: Mapping[str, float]) -> Load:
+    """The load with the torque that a CSV text gives: a first line 's, Nm', or a unit of `radians` (of the shaft).
+
+    MotorError names the line.
+    """
+    unit, points = "", []
+    for k, line in enumerate(text.splitlines(), 1):
+        words = line.partition("#")[0].strip()
+        parts = [part.strip() for part in words.replace(";", ",").replace("\t", ",").split(",")]
+        if not words:
+            continue
+        if not unit:
+            unit = parts[0].lower()
+            if unit not in ("s", *radians) or len(parts) != 2 or parts[1].lower() != "nm":
+                known = ", ".join(f"'{name}, Nm'" for name in ("s", *radians))
+                raise MotorError(f"{file}, line {k}: {words!r}: begin with one of {known}")
+            continue
+        try:
+            place, torque = (float(part) for part in parts)
+        except ValueError:
+            raise MotorError(f"{file}, line {k}: {words!r}: give two numbers") from None
+        points.append((place * radians.get(unit, 1.0), torque))
+        if len(points) > MOST_POINTS:
+            raise MotorError(f"{file}: more than {MOST_POINTS} points")
+    made = profile(points)
+    return replace(load, **{"torque_by_time" if unit == "s" else "torque_by_position": made})  # type: ignore[arg-type]

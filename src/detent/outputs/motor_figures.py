@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from detent.motors.curve import PullOut
+from detent.motors.drive import Drive
+from detent.motors.motor import Motor
 from detent.motors.move import Run
 from detent.motors.named import Measured
-from detent.motors.rotor import Rig
 from detent.outputs.figures import COLOURS, DPI, GREY, PALE, STAMPS, check, style
 from detent.outputs.files import write_whole
 
@@ -24,25 +25,26 @@ if TYPE_CHECKING:
 COMMAND, ROTOR, PHASE_A, PHASE_B, LOST = GREY, COLOURS[0], COLOURS[2], COLOURS[1], "#C0392B"
 
 
-def write_curve(path: Path, rig: Rig, points: Sequence[PullOut], measured: Measured | None = None) -> None:
+def write_curve(
+    path: Path, motor: Motor, drive: Drive, points: Sequence[PullOut], measured: Measured | None = None
+) -> None:
     """Draw a torque curve, and the maker's points where there are some. ValueError, ImportError, OSError."""
     with style():
         figure = _figure(9.0, 5.6)
         axes = figure.add_axes((0.09, 0.13, 0.87, 0.72))
-        per_step = rig.drive.winding.steps
+        per_step = drive.winding.steps
         rates = [point.rate * per_step for point in points]
         axes.plot(rates, [point.torque for point in points], color=ROTOR, label="computed pull-out torque")
-        if measured is not None and measured.winding == rig.drive.winding.name:
+        if measured is not None and measured.winding == drive.winding.name:
             axes.plot(*zip(*measured.points, strict=True), "o", color=PHASE_B, markersize=5,
                       label=f"published: {measured.supply:g} V, {measured.current:g} A")  # fmt: skip
-        axes.axhline(rig.motor.holding_torque, color=PALE, linestyle="--", linewidth=0.9)
+        axes.axhline(motor.holding_torque, color=PALE, linestyle="--", linewidth=0.9)
         axes.set_ylim(bottom=0)
         axes.set_xlim(left=0)
-        dress(axes, f"{rig.drive.winding.name} steps/s", "torque (Nm)")
+        dress(axes, f"{drive.winding.name} steps/s", "torque (Nm)")
         axes.legend(frameon=False, loc="upper right")
-        drive = rig.drive
-        fit = f", inductance x{rig.motor.inductance_factor:.2f}" if rig.motor.inductance_factor != 1 else ""
-        _head(figure, f"{rig.motor.name}: torque against speed",
+        fit = f", inductance x{motor.inductance_factor:.2f}" if motor.inductance_factor != 1 else ""
+        _head(figure, f"{motor.name}: torque against speed",
               f"{drive.supply:g} V  ·  {drive.current:g} A  ·  {drive.winding.name} step  ·  {drive.decay} decay{fit}",
               )  # fmt: skip
         save(figure, path)
