@@ -188,7 +188,7 @@ class TestV9Identities:
         drive = Drive(24, 1.0, HALF, decay)  # type: ignore[arg-type]
         load = Load(inertia=SMALL.rotor, friction=0.01, torque=0.02)
         # at the substep that everything uses, and at one so fine that only rounding is left
-        for substep, part in ((SUBSTEP, 1e-4), (2 * US, 1e-6)):
+        for substep, part in ((SUBSTEP, 1e-5), (2 * US, 1e-6)):
             found = simulate(ramped(600, 200, 1500), Rig(SMALL, drive, load, substep)).energies
             rest = found.electric - found.copper - found.mechanic - found.magnetic
             assert abs(rest) < part * found.electric
