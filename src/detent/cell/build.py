@@ -44,14 +44,15 @@ def build(
     line_timing: bool = True,
     journal: Iterable[Action] = (),
     typed: Typed = nobody_asks,
+    inputs: Mapping[tuple[str, str], Level] | None = None,
 ) -> Cell:
     """The cell, switched on at time 0, with its programs started.
 
     `images` are the units' non-volatile memories as they were kept, `store` keeps them; `typed` is told of each command
-    line before it is sent. `journal` is what was done to a cell like this one: with it, the same happens again. Raises
-    Problem.
+    line before it is sent. `journal` is what was done to a cell like this one: with it, the same happens again.
+    `inputs` are levels that pins of units (UNIT, PIN) have from outside before anything is switched on. Raises Problem.
     """
-    return _Builder(description, read).cell(images or {}, store, record, line_timing, journal, typed)
+    return _Builder(description, read).cell(images or {}, store, record, line_timing, journal, typed, inputs or {})
 
 
 class _End(NamedTuple):
@@ -78,7 +79,7 @@ class _Builder:
 
     def cell(
         self, images: Mapping[str, bytes], store: Store, record: bool, line_timing: bool, journal: Iterable[Action],
-        typed: Typed,
+        typed: Typed, inputs: Mapping[tuple[str, str], Level],
     ) -> Cell:  # fmt: skip
         lines = self.line_units()
         self.make_units(lines, line_timing)
@@ -93,6 +94,8 @@ class _Builder:
         cell = Cell(self.wiring(lines), self.parts, [Net() for _ in self.nets],
                     [self.line(name, units, line_timing) for name, units in lines.items()],
                     [*actions, *journal], store=store, record=record, typed=typed)  # fmt: skip
+        for (unit, pin), level in inputs.items():
+            cell.set_pin(unit, pin, level)
         self.switch_on(cell, images)
         cell.begin(journaling=record)
         return cell

@@ -69,11 +69,33 @@ class Served(Protocol):
         """The host of a line sends `data`, now."""
 
 
+class Companion(Protocol):
+    """What is served beside the cell and belongs to none of its lines: boards with real pins. Times are the pace's."""
+
+    def reading(self) -> Sequence[int]:
+        """Descriptors that may have something to read."""
+
+    def writing(self) -> Sequence[int]:
+        """Descriptors that wait for room."""
+
+    def receive(self, descriptor: int) -> None:
+        """Something can be read."""
+
+    def flush(self, descriptor: int) -> None:
+        """Something can be written."""
+
+    def deadline(self) -> WallNs | None:
+        """When `serve` is to be called at the latest."""
+
+    def serve(self) -> None:
+        """The cell is at its present, and what could be read was: called once in each wake-up."""
+
+
 class Loop:
     """Serves `cell` at `pace`; `endpoints` are pairs of a line and what clients of it connect to.
 
     Several endpoints on a line share it: every one hears everything. `patience` is how far, in cell time, the
-    host of each line may be behind before its clients have to wait.
+    host of each line may be behind before its clients have to wait. A `companion` is served along with it.
     """
 
     def __init__(
@@ -84,8 +106,9 @@ class Loop:
         *,
         patience: Sequence[Ns] | None = None,
         wait: Wait = select.select,
+        companion: Companion | None = None,
     ) -> None:
-        self._cell, self._pace, self._wait = cell, pace, wait
+        self._cell, self._pace, self._wait, self._companion = cell, pace, wait, companion
         self._endpoints = list(endpoints)
         self._of_line: dict[int, list[Endpoint]] = defaultdict(list)
         self._listeners: dict[int, list[Listener]] = defaultdict(list)
@@ -167,11 +190,27 @@ class Loop:
                 readers[descriptor] = pair
             for descriptor in endpoint.writing():
                 writers[descriptor] = endpoint
+        companion = self._companion
+        beside: tuple[Sequence[int], Sequence[int]] = ((), ())
+        if companion is not None:
+            beside = companion.reading(), companion.writing()
 
-        readable, writable, _ = self._wait(list(readers), list(writers), (), self._timeout())
+        readable, writable, _ = self._wait(
+            [*readers, *beside[0]], [*writers, *beside[1]], (), self._timeout()
+        )  # fmt: skip
         self._catch_up()
+        if companion is not None:
+            for descriptor in beside[0]:
+                if descriptor in readable:
+                    companion.receive(descriptor)
+            for descriptor in beside[1]:
+                if descriptor in writable:
+                    companion.flush(descriptor)
+            companion.serve()
         wall = clock()
         for descriptor in readable:
+            if descriptor in beside[0]:
+                continue
             reader = readers[descriptor]
             if reader is None:
                 os.read(self._woken, 64)
@@ -182,7 +221,8 @@ class Loop:
             if data:
                 cell.send(line, data)
         for descriptor in writable:
-            writers[descriptor].flush()
+            if descriptor not in beside[1]:
+                writers[descriptor].flush()
         self._tell(wall)
         for _, endpoint in self._endpoints:
             due = endpoint.deadline()
@@ -197,6 +237,10 @@ class Loop:
             due -= EARLY
         for _, endpoint in self._endpoints:
             other = endpoint.deadline()
+            if other is not None and (due is None or other < due):
+                due = other
+        if self._companion is not None:
+            other = self._companion.deadline()
             if other is not None and (due is None or other < due):
                 due = other
         if due is None:

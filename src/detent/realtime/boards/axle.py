@@ -1,0 +1,131 @@
+"""One driven axis within the cell that is driven: what it did, what it was told, whether it may move."""
+
+from typing import TypeAlias
+
+from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.realtime.boards.channels import Channel, alike
+from detent.realtime.boards.guard import Guard
+from detent.realtime.boards.plan import DrivenAxis
+from detent.realtime.boards.states import Standing
+from detent.realtime.boards.stepper import Stepper
+from detent.ticks import NEVER, Ns
+
+Motion: TypeAlias = MotionStarted | MotionCut | MotionEnded
+
+
+class Axle:
+    """A driven axis. Its motions are a channel: they can be taken back."""
+
+    def __init__(self, what: DrivenAxis, stepper: Stepper, guard: Guard, shaft: int) -> None:
+        self.what, self.stepper, self.guard = what, stepper, guard
+        self.motions: Channel[Motion] = Channel()
+        self.standing, self.why, self.known = Standing.WAITING, "", True
+        self.stops = 0
+        self._shaft = shaft  # at rest
+
+    @property
+    def name(self) -> str:
+        """As people know it."""
+        return self.what.stepper
+
+    @property
+    def motion(self) -> MotionStarted | None:
+        """The motion under way."""
+        return self.motion_after(self.motions.count)
+
+    def motion_after(self, count: int) -> MotionStarted | None:
+        """The motion in force behind the first `count` entries."""
+        told = self.motions.before(count)
+        return told[-1] if told and isinstance(told[-1], MotionStarted) else None
+
+    def take(self, entry: Motion) -> None:
+        """The axis did this."""
+        motion = self.motion
+        if isinstance(entry, MotionStarted):
+            self._shaft = entry.shaft
+        elif motion is not None:
+            self._shaft = motion.shaft + motion.direction * entry.last
+        self.motions.append(entry)
+
+    def take_back(self, count: int, shaft: int) -> list[Motion]:
+        """Only the first `count` entries have happened, and the axis is at `shaft`; returned are the others."""
+        self._shaft = shaft
+        return self.motions.cut(count)
+
+    def shaft_at(self, now: Ns) -> int:
+        """Where the cell has the shaft."""
+        motion = self.motion
+        if motion is None:
+            return self._shaft
+        return motion.shaft + motion.direction * _given(motion, now)
+
+    def displace(self, by: int) -> None:
+        """The shaft, at rest, is elsewhere."""
+        self._shaft += by
+
+    def instant_of(self, shaft: int, near: Ns) -> Ns:
+        """The instant nearest to `near` at which the cell had the shaft at `shaft`; `near` itself if there is none.
+
+        From the pulse that brought it there up to the last nanosecond before the next.
+        """
+        best, away = near, NEVER
+        told = self.motions.before(self.motions.count)
+        for place, motion in enumerate(told):
+            if not isinstance(motion, MotionStarted):
+                continue
+            after = told[place + 1] if place + 1 < len(told) else None
+            pulse = (shaft - motion.shaft) * motion.direction
+            steps = motion.train.steps
+            if pulse < motion.first - 1 or (steps is not None and pulse > steps):
+                continue
+            begin = motion.at if pulse < motion.first else motion.train.time_of(pulse)
+            end = NEVER if after is None else after.at
+            if pulse != steps:
+                end = min(end, motion.train.time_of(pulse + 1) - 1)
+            elif after is not None and not isinstance(after, MotionStarted):
+                following = told[place + 2] if place + 2 < len(told) else None
+                end = NEVER if following is None else following.at
+            if begin > end:
+                continue
+            nearest = min(max(near, begin), end)
+            if abs(nearest - near) < away:
+                best, away = nearest, abs(nearest - near)
+        return best
+
+    def tell_difference(self, old: list[Motion], new: list[Motion], now: Ns) -> int:
+        """Another axis was taken back, and in it this one did `new` instead of `old`. Pulses that left and are none.
+
+        What both begin with was told already. Where nothing has left that is not so, the stepper is told of the rest.
+        """
+        same = alike(old, new)
+        if same < len(old):
+            force = self.motion_after(self.motions.count - len(new) + same)
+            first = min(item.at for item in (*old[same : same + 1], *new[same : same + 1]))
+            left, due = _pulses(force, old[same:], first, now), _pulses(force, new[same:], first, now)
+            if left != due[: len(left)]:
+                return len(left)
+            last = old[-1]
+            if isinstance(last, MotionStarted):
+                self.stepper.tell(MotionCut(now, _given(last, now), self.what.axis))
+            if force is not None:
+                self.stepper.tell(force._replace(first=_given(force, first) + len(left) + 1))
+        for motion in new[same:]:
+            self.stepper.tell(motion)
+        return 0
+
+
+def _pulses(force: MotionStarted | None, told: list[Motion], after: Ns, until: Ns) -> list[tuple[Ns, int]]:
+    """Time and direction of the pulses behind `after` and up to `until`, with `force` in force at `after`."""
+    found: list[tuple[Ns, int]] = []
+    current, last = force, after
+    for motion in (*told, None):
+        end = until if motion is None else motion.at
+        if current is not None:
+            low = max(_given(current, last), current.first - 1)
+            found += [(current.train.time_of(n), current.direction) for n in range(low + 1, _given(current, end) + 1)]
+        current, last = (motion if isinstance(motion, MotionStarted) else None), end
+    return found
+
+
+def _given(motion: MotionStarted, now: Ns) -> int:
+    return max(motion.train.steps_by(now), motion.first - 1)

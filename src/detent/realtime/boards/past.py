@@ -1,0 +1,102 @@
+"""The last moments of a cell, and how it is taken back to an instant and lives through what follows once more.
+
+Copies are kept from time to time; between them the cell is run again with what was done to it (its journal), and does
+the same again. The cell keeps its identity: whoever holds it sees it as it is now.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from detent.cell.cell import Cell
+from detent.cell.deeds import Action, Deed
+from detent.realtime.watch import Lately
+from detent.ticks import Ns
+
+MOST_DEEDS = 4_000  # kept
+
+
+class Moment(NamedTuple):
+    """A cell at one time, and how much its owner had counted up to there."""
+
+    cell: Cell
+    deeds: int
+    counts: tuple[int, ...]
+
+    @property
+    def now(self) -> Ns:
+        """Its time."""
+        return self.cell.now
+
+
+class Past:
+    """The past of `cell`, which keeps its journal for it from now on. `counts` are the owner's, of what it was told."""
+
+    def __init__(self, cell: Cell, counts: Callable[[], tuple[int, ...]]) -> None:
+        self.cell, self._counts = cell, counts
+        cell.journal, cell.journaling = Lately(MOST_DEEDS), True
+        self.moments: list[Moment] = []
+
+    def keep(self) -> Moment:
+        """Keep a copy of the cell as it is. Everything it did must have been taken over."""
+        moment = Moment(self.cell.copy(), _made(self.cell), self._counts())
+        self.moments.append(moment)
+        return moment
+
+    def forget(self, before: Ns) -> Moment | None:
+        """Nobody goes back to earlier than `before`; the oldest moment that is still needed."""
+        while len(self.moments) > 1 and self.moments[1].now <= before:
+            del self.moments[0]
+        return self.moments[0] if self.moments else None
+
+    def clear(self) -> None:
+        """Nobody goes back."""
+        self.moments.clear()
+
+    def reaches(self, at: Ns) -> bool:
+        """Whether a moment at or before `at` is kept."""
+        return bool(self.moments) and self.moments[0].now <= at
+
+    def back(
+        self,
+        at: Ns,
+        deeds: Sequence[Deed],
+        drop: Callable[[Action], bool],
+        arrived: Callable[[Moment], None],
+    ) -> None:
+        """The cell is as it was at `at`; `deeds` are done there, and then it lives on to its present.
+
+        What was done to it later is done again, but what is to `drop`. `arrived` is called at `at`, before the deeds,
+        with the moment from which it was run. IndexError where no moment is kept that is old enough.
+        """
+        cell, present = self.cell, self.cell.now
+        base = [moment for moment in self.moments if moment.now <= at][-1]
+        actions = _since(cell, base.deeds)
+        vars(cell).update(vars(base.cell.copy()))
+        later = [action for action in actions if action.at > at and not drop(action)]
+        for action in actions:
+            if action.at <= at:
+                perform(cell, action)
+        cell.run_to(at)
+        arrived(base)
+        self.moments = [moment for moment in self.moments if moment.now <= at]
+        for deed in deeds:
+            perform(cell, Action(at, deed))
+        for action in later:
+            perform(cell, action)
+        cell.run_to(present)
+
+
+def perform(cell: Cell, action: Action) -> None:
+    """Do it, at its time, and let everything of that instant happen."""
+    cell.run_to(action.at)
+    action.deed.do(cell)
+    cell.run_to(cell.now)
+
+
+def _made(cell: Cell) -> int:
+    return int(getattr(cell.journal, "forgotten", 0)) + len(cell.journal)
+
+
+def _since(cell: Cell, count: int) -> list[Action]:
+    forgotten = int(getattr(cell.journal, "forgotten", 0))
+    return list(cell.journal)[max(count - forgotten, 0) :]

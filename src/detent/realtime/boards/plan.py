@@ -1,0 +1,150 @@
+"""From the tables of a cell file to what each board is told hangs on it, and back: whose pin is what.
+
+Names on the boards are the cell's own: ``slide`` or ``table.X`` for a stepper, ``slide.MOV`` for a pin.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from detent.cell.description import Description, Problem
+from detent.cell.hardware import Board, Hardware
+from detent.controllers.device import Controller
+from detent.pins import HIGH, PinKind
+from detent.realtime.boards.setup import BoardSetup, DriverSetup, InputSetup, OutSetup, Pin, SetupProblem, StepperSetup
+from detent.ticks import MS, US, Ns
+
+MOST_MARGIN: Ns = 4 * MS
+LEAST_PULSE: Ns = 2 * US
+
+UnitPin = tuple[str, str]
+
+
+class DrivenAxis(NamedTuple):
+    """An axis of a controller that real pins carry; names are those on the board, "" for what is not there."""
+
+    unit: str
+    axis: str
+    stepper: str
+    board: str
+    shaft: int = 0  # where the axis stands when the cell starts
+    enable: str = ""
+    driver: str = ""
+    half: str = ""
+
+
+class Plan(NamedTuple):
+    """What hangs on the boards of a cell. `setups` come with the address of each; the first is master of time."""
+
+    setups: tuple[tuple[BoardSetup, str], ...]
+    axes: tuple[DrivenAxis, ...]
+    outs: Mapping[UnitPin, str]
+    inputs: Mapping[str, UnitPin]
+    board_of: Mapping[str, str]  # of each input
+    lead: Ns  # the longest of all boards
+    held: bool  # replies wait until nothing can change them
+    file: str
+    keys: Mapping[str, str]  # where the file says what hangs there, by name; of a pin the whole key
+
+    def problem(self, fault: SetupProblem) -> Problem:
+        """The same with the key of the cell file."""
+        key = self.keys.get(fault.item, fault.item)
+        sub = {"lead": "lead", "error": "error"}.get(fault.key, fault.key)
+        if fault.item in {setup.name for setup, _ in self.setups}:
+            key = f"boards.{fault.item}.{sub or 'serial'}"
+        elif fault.key == "watchdog":
+            setup = next(s for s, _ in self.setups if any(out.name == fault.item for out in s.outs))
+            key = f"boards.{setup.name}.watchdog"
+        elif fault.key and fault.key != "pin":
+            key = f"{key}.{sub}"
+        return Problem(self.file, key, str(fault.args[0]) if not hasattr(fault, "text") else fault.text)
+
+
+def plan(described: Description, controllers: Mapping[str, Controller]) -> Plan:
+    """What hangs where, of a cell that `build` has found sound. Raises Problem where nothing does."""
+    if not described.hardware:
+        raise Problem(described.file, "hardware", "no pin of this cell is real: add [boards.NAME] and [hardware.UNIT]")
+    axes, keys = [], {}
+    outs: dict[UnitPin, str] = {}
+    inputs: dict[str, UnitPin] = {}
+    board_of: dict[str, str] = {}
+    used = [name for name in described.boards if any(t.board == name for t in described.hardware.values())]
+    hang: dict[str, _Hang] = {name: _Hang() for name in used}
+    for key, table in described.hardware.items():
+        unit, _, axis = key.partition(".")
+        controller, board, here = controllers[unit], described.boards[table.board], hang[table.board]
+        where = f"hardware.{key}"
+        for pin, text in table.outputs.items():
+            found = next(p for p in controller.pins if p.name == pin)
+            rest = found.rest == HIGH or found.kind is PinKind.OPEN_COLLECTOR
+            outs[unit, pin] = name = f"{unit}.{pin}"
+            here.outs.append(OutSetup(name, Pin.parse(text), rest, rest))
+            keys[name] = f"{where}.outputs.{pin}"
+        for pin, text in table.inputs.items():
+            name = f"{unit}.{pin}"
+            inputs[name], board_of[name], keys[name] = (unit, pin), table.board, f"{where}.inputs.{pin}"
+            here.inputs.append(InputSetup(name, Pin.parse(text), table.sample, table.samples))
+        if table.step is not None:
+            axes.append(
+                _axis(
+                    DrivenAxis(unit, axis, key, table.board, described.units[unit].shaft),
+                    table,
+                    controller,
+                    board,
+                    here,
+                    keys,
+                )
+            )
+    setups = tuple((hang[name].setup(name, described.boards[name]), described.boards[name].serial) for name in used)
+    boards = [described.boards[name] for name in used]
+    held = all(board.replies == "held" for board in boards)
+    lead = max(board.lead for board in boards)
+    return Plan(setups, tuple(axes), outs, inputs, board_of, lead, held, described.file, keys)
+
+
+class _Hang:
+    """What hangs on one board."""
+
+    def __init__(self) -> None:
+        self.steppers: list[StepperSetup] = []
+        self.outs: list[OutSetup] = []
+        self.inputs: list[InputSetup] = []
+        self.drivers: list[DriverSetup] = []
+
+    def setup(self, name: str, board: Board) -> BoardSetup:
+        margin = max(min(MOST_MARGIN, board.lead // 3), MS)
+        return BoardSetup(name, board.lead, board.error, margin, tuple(self.steppers), tuple(self.outs),
+                          tuple(self.inputs), tuple(self.drivers))  # fmt: skip
+
+
+def _axis(
+    axis: DrivenAxis, table: Hardware, controller: Controller, board: Board, here: _Hang, keys: dict[str, str]
+) -> DrivenAxis:
+    key, where = axis.stepper, f"hardware.{axis.stepper}"
+    assert table.step is not None
+    assert table.dir is not None
+    pulse = table.pulse if table.pulse is not None else max(controller.pulse_output.width, LEAST_PULSE)
+    minus = None if table.minus is None else Pin.parse(table.minus)
+    here.steppers.append(StepperSetup(key, Pin.parse(table.step), Pin.parse(table.dir), pulse, minus))
+    keys[key] = where
+    if table.enable is not None:
+        axis = axis._replace(enable=f"{key}.enable")
+        here.outs.append(OutSetup(axis.enable, Pin.parse(table.enable), watchdog=board.watchdog))
+        keys[axis.enable] = f"{where}.enable"
+    driver = table.driver
+    if driver is not None and driver.kind == "plain":
+        assert driver.half is not None
+        axis = axis._replace(half=f"{key}.half")
+        here.outs.append(OutSetup(axis.half, Pin.parse(driver.half), initial=True, off=True))
+        keys[axis.half] = f"{where}.driver.half"
+    elif driver is not None and driver.kind != "plain":
+        axis = axis._replace(driver=f"{key}.driver")
+        keys[axis.driver] = f"{where}.driver"
+        pins = {k: Pin.parse(text) for k, text in driver.pins().items()}
+        here.drivers.append(
+            DriverSetup(
+                axis.driver, driver.kind, driver.sense, driver.amperes, pins.get("uart"), pins.get("transmit"),
+                driver.address, pins.get("select"), driver.bus, pins.get("clock"), pins.get("mosi"), pins.get("miso"),
+                driver.quiet, driver.interpolate,
+            )
+        )  # fmt: skip
+    return axis
