@@ -21,6 +21,12 @@ class Joined(NamedTuple):
 
 def check(described: Description, controllers: Mapping[str, Controller], joined: Callable[[str, str], Joined]) -> None:
     """Raise Problem for the first thing that cannot be. `joined` tells what drives an input within the cell."""
+    used = {table.board for table in described.hardware.values()}
+    leads = {name: board.lead for name, board in described.boards.items() if name in used}
+    if len(set(leads.values())) > 1:
+        other = next(name for name in leads if leads[name] != next(iter(leads.values())))
+        what = f"it is {show_duration(leads[other])} here and {show_duration(next(iter(leads.values())))} elsewhere"
+        raise Problem(described.file, f"boards.{other}.lead", f"{what}: what happens together has to leave together")
     taken: dict[tuple[str, str], str] = {}
     wired: dict[tuple[str, str], str] = {}
     for key, table in described.hardware.items():

@@ -1,71 +1,115 @@
-"""A cell behind ideal boards, served by the loop itself in virtual time; and the same cell with ideal switches."""
+"""A cell behind fake boards, served by the loop itself in virtual time; and the same cell with ideal switches."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from tests.realtime.boards.ideal import EPOCH, IdealBoards
-
+from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.delivery import Store, no_store
-from detent.cell.description import parse
+from detent.cell.description import Description, parse
 from detent.realtime.boards.driven import Driven
-from detent.realtime.boards.plan import plan
+from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
+from detent.realtime.boards.fake.port import FakePort
+from detent.realtime.boards.opening import boards_of, make_ready
+from detent.realtime.boards.plan import Plan, plan
 from detent.realtime.boards.replies import HeldStores
+from detent.realtime.boards.setup import Pin
 from detent.realtime.boards.states import News
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace
-from detent.ticks import US, Ns
+from detent.ticks import MS, SECOND, US, Ns
 
 
 def no_file(name: str) -> str:
     raise FileNotFoundError(name)
 
 
+def machine_of(described: Description, made: Plan, board: str, switches: Mapping[str, tuple[str, int, int]]) -> Machine:
+    """The machine behind a board: an axis for each stepper; `switches`: UNIT.PIN -> stepper, first and last place low."""
+    setup = next(s for s, _ in made.setups if s.name == board)
+    axes = {}
+    for stepper in setup.steppers:
+        minus = None if stepper.minus is None else stepper.minus.name
+        axes[stepper.name] = MachineAxis(stepper.step.name, stepper.dir.name, stepper.dir.active_low, minus)
+    found = []
+    for put in setup.inputs:
+        if put.name in switches:
+            axis, low, high = switches[put.name]
+            found.append(MachineSwitch(axis, put.pin.name, low, high, put.pin.active_low))
+    return Machine(axes=axes, switches=found)
+
+
 class Bench:
-    """`text` is a cell file. `hosts` hear what its lines say, with the board's time at which they heard it."""
+    """`text` is a cell file. `heard` is what the hosts of its lines heard: board ns, cell time, value."""
 
     def __init__(
         self,
         text: str,
         *,
+        switches: Mapping[str, tuple[str, int, int]] | None = None,
         store: Store = no_store,
         line_timing: bool = False,
-        machine: dict[str, Callable[[dict[str, Any]], bool]] | None = None,
-        latency: Ns = 500 * US,
         jitter: Callable[[], Ns] = lambda: 0,
+        port: Mapping[str, Any] | None = None,
+        board: Mapping[str, Any] | None = None,
     ) -> None:
-        self.wall = EPOCH + 5_000_000_000
-        self.jitter = jitter
+        self.wall = 1_000 * SECOND
+        self._jitter, self._until = jitter, self.wall
         described = parse(text, "cell.toml")
         trial = build(described, no_file, record=False)
         self.plan = plan(described, trial.controllers())
-        self.boards = IdealBoards(self.plan, lambda: self.wall, latency=latency)
-        self.boards.machine = machine or {}
-        self.boards.look(0)
-        inputs = {name: int(self.boards.levels[name]) for name in self.plan.inputs}
+        self.machines: dict[str, Machine] = {}
+        self.ports: dict[str, FakePort] = {}
+        made = iter(self.plan.setups)
+
+        def open_port(address: str) -> FakePort:
+            name = next(made)[0].name
+            self.machines[name] = machine_of(described, self.plan, name, switches or {})
+            fake = FakeBoard(self.machines[name], **{"moves": 400, **(board or {})})
+            fake.kept_log = False
+            self.ports[name] = FakePort(fake, **(port or {}))
+            return self.ports[name]
+
+        self.boards = boards_of(self.plan, open_port)
+        levels = make_ready(self.boards, self.plan, lambda: self.wall, self._sleep)
         self.stores = HeldStores(store)
-        given = {self.plan.inputs[name]: level for name, level in inputs.items()}
+        given = {self.plan.inputs[name]: level for name, level in levels.items()}
         self.cell: Cell = build(described, no_file, store=self.stores.save, line_timing=line_timing, inputs=given)
-        self.boards._mail.clear()  # noqa: SLF001  # what was read at the start
         self.news: list[News] = []
-        self.driven = Driven(self.cell, self.boards, self.plan, self.stores, wall=lambda: self.wall,  # type: ignore[arg-type]
-                             tell=self.news.append)  # fmt: skip
+        self.driven = Driven(
+            self.cell, self.boards, self.plan, self.stores, wall=lambda: self.wall, tell=self.news.append
+        )
         self.pace = Pace(1, origin=self.cell.now, clock=self.driven.clock)
         self.loop = Loop(self.driven, self.pace, [], companion=self.driven, wait=self._wait)
-        self.loop._tell = self._hear  # type: ignore[method-assign]  # noqa: SLF001
-        self.driven.begin(self.pace, inputs)
-        self.heard: list[list[tuple[Ns, Ns, int]]] = [[] for _ in self.cell.lines]  # board time, cell time, value
-        self._until = self.wall
+        self.loop._tell = self._hear  # type: ignore[method-assign]
+        self.driven.begin(self.pace, levels)
+        self.heard: list[list[tuple[Ns, Ns, int]]] = [[] for _ in self.cell.lines]
 
     def close(self) -> None:
         self.loop.close()
 
-    def _wait(self, readers: object, writers: object, _: object, seconds: float | None) -> tuple[list[int], ...]:
-        left = self._until - self.wall
+    def __enter__(self) -> "Bench":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _sleep(self, _: Sequence[int], __: Sequence[int], seconds: float) -> tuple[Sequence[int], Sequence[int]]:
+        self.wall += max(round(seconds * 1e9), 10 * US)
+        return (), ()
+
+    def _wait(self, *given: Any) -> tuple[list[int], list[int], list[int]]:
+        left, seconds = self._until - self.wall, given[3]
         sleep = left if seconds is None else min(round(seconds * 1e9) + 1, left)
-        self.wall += max(sleep, 10 * US) + self.jitter()
+        self.wall += max(sleep, 10 * US) + self._jitter()
         return [], [], []
+
+    def _hear(self, _: int) -> None:
+        for number, line in enumerate(self.driven.lines):
+            for heard in line.take():
+                self.heard[number].append((self.driven.clock(), heard.at, heard.char.value))
 
     def run(self, span: Ns) -> None:
         """Let so much wall time pass."""
@@ -73,17 +117,19 @@ class Bench:
         while self.wall < self._until:
             self.loop.step()
 
-    def _hear(self, _: int) -> None:
-        for number, line in enumerate(self.driven.lines):
-            for heard in line.take():
-                self.heard[number].append((self.boards.board_now(), heard.at, heard.char.value))
+    def rest(self, most: Ns = 60 * SECOND) -> None:
+        """Until nothing moves, on the pins too."""
+        end = self.wall + most
+        while self.wall < end and any(state.moving for state in self.driven.axes()):
+            self.run(20 * MS)
+        self.run(self.plan.lead + self.driven.lag + 150 * MS)
 
     def type(self, unit: str, text: str) -> None:
         """The host of a unit sends a line, now: when the cell is at its present."""
         self.send(unit, self.cell.talker(unit).frame(text))
 
     def send(self, unit: str, data: bytes) -> None:
-        self.loop._catch_up()  # noqa: SLF001
+        self.loop._catch_up()
         self.driven.send(self.cell.wiring.line_of[self.cell.unit(unit)], data)
 
     def said(self, unit: str) -> str:
@@ -94,7 +140,39 @@ class Bench:
         """The computer is elsewhere."""
         self.wall += span
 
-    def edges(self, stepper: str) -> list[tuple[Ns, int]]:
-        """The steps on the pins so far: cell time at which the cell has them, and the position behind each."""
-        self.boards.live()
-        return [(cell, position) for _, _, position, cell in self.boards.steppers[stepper].edges]
+    def press(self, name: str, level: int) -> None:
+        """A hand gives an input (UNIT.PIN) a logical level, now."""
+        board = self.plan.board_of[name]
+        pin: Pin = next(i.pin for s, _ in self.plan.setups for i in s.inputs if i.name == name)
+        self.ports[board].run_to(self.wall)
+        self.machines[board].set(pin.name, bool(level) is not pin.active_low, self.ports[board].board.now)
+
+    def position(self, stepper: str) -> int:
+        """Where the motor is."""
+        board = self.boards.home[stepper]
+        self.ports[board].run_to(self.wall)
+        return self.machines[board].axes[stepper].position
+
+    def edges(self, stepper: str) -> list[tuple[int, int]]:
+        """The steps on the pins so far: tick, and the place behind each."""
+        board = self.boards.home[stepper]
+        self.ports[board].run_to(self.wall)
+        return [(tick, place) for tick, axis, place in self.machines[board].steps if axis == stepper]
+
+
+def pulses(motions: Sequence[MotionStarted | MotionCut | MotionEnded], until: Ns) -> list[tuple[Ns, int]]:
+    """The pulses that an axis gave: time, and the place behind each."""
+    found: list[tuple[Ns, int]] = []
+    current: MotionStarted | None = None
+    for motion in (*motions, None):
+        if current is not None:
+            if isinstance(motion, MotionStarted):
+                last = motion.first - 1
+            else:
+                last = current.train.steps_by(until) if motion is None else motion.last
+            found += [
+                (current.train.time_of(n), current.shaft + current.direction * n)
+                for n in range(current.first, last + 1)
+            ]
+        current = motion if isinstance(motion, MotionStarted) else None
+    return found

@@ -1,8 +1,9 @@
 """A cell that drives real pins: it stands between the loop and the cell, and between the cell and its boards.
 
-Cell time is the board's time, and everything leaves a constant lead later. Only pulses that are certain are sent: those
-of the cell's past. A stop in the firmware takes the cell back to the instant of the trigger: there it gets the input, and
-lives through what follows once more. What cannot be taken back (replies, stored images) waits until it is certain.
+Cell time is the board's time, and everything leaves a constant lead later. Only pulses that are certain are sent:
+those of the cell's past. A stop in the firmware takes the cell back to the instant of the trigger: there it gets the
+input, and lives through what follows once more. What cannot be taken back (replies, stored images) waits until it is
+certain.
 """
 
 import time
@@ -37,17 +38,15 @@ from detent.realtime.boards.past import Moment, Past
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.replies import HeldLine, HeldStores
 from detent.realtime.boards.setup import SetupProblem
-from detent.realtime.boards.several import Boards
+from detent.realtime.boards.several import COMMIT_EVERY, Boards
 from detent.realtime.boards.states import AxisState, BoardState, News, Standing, Weight
 from detent.realtime.pace import Pace, WallNs
 from detent.ticks import MS, NEVER, Ns, show_duration
 from detent.uart import Chars
 
-COMMIT: WallNs = 2 * MS  # between two batches for the boards, while something moves
 CERTAIN: Ns = 5 * MS  # a stop is known so long after it happened
 KEEP: Ns = 50 * MS  # between two moments to which the cell can be taken back, while a stop is armed
 SLACK: Ns = 200 * MS  # a host that was stalled hears of a stop so late
-FORGOTTEN: Ns = 50 * MS  # an input for which a stop watches, and that did not stop: then it is told the ordinary way
 
 
 class Out:
@@ -96,7 +95,6 @@ class Driven:
         self._input_of = {place: name for name, place in plan.inputs.items()}
         self._raw: dict[str, Level] = {}  # as the boards last said
         self._given: dict[str, Level] = {}  # as the cell was told
-        self._ignored: dict[str, Ns] = {}  # since when a stop should have told of an input
         self._reports: deque[tuple[Action, Ns]] = deque(maxlen=256)  # what inputs gave, and the board's time of it
         self._align = 0  # board ns at cell time 0
         self.lines = [HeldLine(cell, number, self._horizon) for number in range(len(cell.lines))]
@@ -176,16 +174,15 @@ class Driven:
 
     def flush(self, descriptor: int) -> None:
         """Something can be written."""
-        self.boards.flush(descriptor)
+        self.boards.flush(descriptor, self._wall())
 
     def deadline(self) -> Ns | None:
         """When `serve` is to be called at the latest, by `clock`."""
         wall, clock = self._wall(), self.clock()
-        due = self.boards.deadline()
-        if self._moving or self._pending:
-            commit = self._committed + COMMIT
-            due = commit if due is None else min(due, commit)
-        at = None if due is None else clock + due - wall
+        times = [at for at in (self.boards.deadline(), self.boards.commit_at()) if at is not None]
+        if self._pending:
+            times.append(self._committed + COMMIT_EVERY)
+        at = clock + min(times) - wall if times else None
         behind = self._behind  # what was said and stored before that is certain
         held = min((line.first for line in self.lines), default=NEVER)
         tail = min((axle.guard.next for axle in self.axles), default=NEVER)
@@ -203,9 +200,9 @@ class Driven:
         for event in self.boards.events():
             self._happened(event)
         self._absorb()
-        self._look_at_inputs()
         self._refresh()
-        if (self._moving or self._pending) and wall - self._committed >= COMMIT:
+        wanted = self.boards.commit_at()
+        if (self._pending and wall - self._committed >= COMMIT_EVERY) or (wanted is not None and wanted <= wall):
             self.commit()
             for event in self.boards.events():
                 self._happened(event)
@@ -217,10 +214,6 @@ class Driven:
         self._committed = self._wall()
         self.boards.commit(self.cell.now, self._committed)
         self._pending = False
-
-    @property
-    def _moving(self) -> bool:
-        return any(axle.motion is not None or not axle.stepper.resting for axle in self.axles)
 
     @property
     def _guarded(self) -> bool:
@@ -393,20 +386,6 @@ class Driven:
                 axle.guard.refresh(self.cell.now, self.cell.now)
         self._arm()
 
-    def _watches(self, name: str, level: Level) -> bool:
-        return any(axle.guard.armed.get(name) == level for axle in self.axles)
-
-    def _look_at_inputs(self) -> None:
-        """Give the cell what it was not given because a stop was to tell it, and none did."""
-        for name, level in self._raw.items():
-            if level == self._given.get(name):
-                self._ignored.pop(name, None)
-                continue
-            since = self._ignored.setdefault(name, self.cell.now)
-            if not self._watches(name, level) or self.cell.now - since > FORGOTTEN + self.plan.lead + self.lag:
-                self._ignored.pop(name, None)
-                self._give(name, level, self.clock())
-
     def _give(self, name: str, level: Level, board_ns: Ns) -> None:
         """An input has another level, as far as the cell is concerned from now on."""
         unit, pin = self.plan.inputs[name]
@@ -447,6 +426,7 @@ class Driven:
         motions: dict[str, list[Motion]] = {}
         levels: dict[str, list[tuple[Ns, bool]]] = {}
         counts: list[int] = []
+        places: dict[str, int] = {}
         if not self.past.moments:
             self.past.keep()
 
@@ -468,7 +448,7 @@ class Driven:
             place = len(self.axles)
             for out in self._outs.values():
                 count = moment.counts[place] + self._levels_in(batches, out)
-                levels[out.name] = out.levels.cut(count)
+                levels[out.name], places[out.name] = out.levels.cut(count), count
                 place += 1
             for number in range(len(self.lines)):
                 heard = self.cell.lines[number].take()
@@ -488,7 +468,7 @@ class Driven:
         self._tell_axles(stopped, shaft, motions, counts)
         self.commit()
         for out in self._outs.values():
-            self._tell_out(out, levels[out.name], at, stopped)
+            self._tell_out(out, levels[out.name], out.levels.since(places[out.name]), at, stopped)
         self._pending = True
 
     def _levels_in(self, batches: Sequence[Batch], out: Out) -> int:
@@ -523,8 +503,9 @@ class Driven:
             for motion in new:
                 axle.stepper.tell(motion)
 
-    def _tell_out(self, out: Out, old: list[tuple[Ns, bool]], at: Ns, stopped: Axle) -> None:
-        new = [item for item in out.levels.before(out.levels.count) if item[0] >= at]
+    def _tell_out(
+        self, out: Out, old: list[tuple[Ns, bool]], new: list[tuple[Ns, bool]], at: Ns, stopped: Axle
+    ) -> None:
         mine = out.unit == self.cell.unit(stopped.what.unit)
         same = alike(old, new)
         if not mine and same == len(old):
@@ -547,16 +528,19 @@ class Driven:
         match event:
             case InputChanged(_, name, level, at):
                 self._raw[name] = int(level)
-                if int(level) != self._given.get(name) and not self._watches(name, int(level)):
+                if int(level) != self._given.get(name):
                     self._give(name, int(level), at)
             case Stopped():
                 axle = self._by_stepper[event.stepper]
-                if axle.standing is Standing.DRIVEN:
+                if axle.standing is Standing.DRIVEN and event.input in self.plan.inputs:
                     self._stopped(event)
+                elif axle.standing is Standing.DRIVEN:
+                    self._fault(axle, "the board has stopped it, and does not say why")
+                    self._place(axle, event.shaft)
             case Slipped(_, stepper, at, by):
+                self._later(self._by_stepper[stepper], at)
                 self._say(Weight.WARNING, f"{stepper} slipped by {show_duration(by)}: the computer was late; no step is "
                           f"lost ({self._by_stepper[stepper].stepper.slips} slips so far)")  # fmt: skip
-                self._later(self._by_stepper[stepper], at)
             case CountDiffers(_, stepper, shaft, counted):
                 axle = self._by_stepper[stepper]
                 if axle.standing is Standing.DRIVEN:

@@ -1,7 +1,7 @@
 """Which inputs stop an axis in the firmware, now and until the steps of what was before have left the pins.
 
-What the cell does leaves a lead later. So an input that could stop a motion watches until the last step of that motion is
-over, though the cell has gone on to the next; what stops that one is added meanwhile.
+What the cell does leaves a lead later. So an input that could stop a motion watches until the last step of that motion
+is over, though the cell has gone on to the next; what stops that one is added meanwhile.
 """
 
 from collections.abc import Mapping

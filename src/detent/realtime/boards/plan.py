@@ -84,16 +84,10 @@ def plan(described: Description, controllers: Mapping[str, Controller]) -> Plan:
             inputs[name], board_of[name], keys[name] = (unit, pin), table.board, f"{where}.inputs.{pin}"
             here.inputs.append(InputSetup(name, Pin.parse(text), table.sample, table.samples))
         if table.step is not None:
-            axes.append(
-                _axis(
-                    DrivenAxis(unit, axis, key, table.board, described.units[unit].shaft),
-                    table,
-                    controller,
-                    board,
-                    here,
-                    keys,
-                )
-            )
+            what = DrivenAxis(unit, axis, key, table.board, described.units[unit].shaft)
+            mine = [(k, t) for k, t in described.hardware.items() if k.partition(".")[0] == unit]
+            stops = tuple(f"{unit}.{pin}" for _, t in mine if t.board == table.board for pin in t.inputs)
+            axes.append(_axis(what, table, controller, board, here, keys, stops))
     setups = tuple((hang[name].setup(name, described.boards[name]), described.boards[name].serial) for name in used)
     boards = [described.boards[name] for name in used]
     held = all(board.replies == "held" for board in boards)
@@ -117,14 +111,20 @@ class _Hang:
 
 
 def _axis(
-    axis: DrivenAxis, table: Hardware, controller: Controller, board: Board, here: _Hang, keys: dict[str, str]
+    axis: DrivenAxis,
+    table: Hardware,
+    controller: Controller,
+    board: Board,
+    here: _Hang,
+    keys: dict[str, str],
+    stops: tuple[str, ...],
 ) -> DrivenAxis:
     key, where = axis.stepper, f"hardware.{axis.stepper}"
     assert table.step is not None
     assert table.dir is not None
     pulse = table.pulse if table.pulse is not None else max(controller.pulse_output.width, LEAST_PULSE)
     minus = None if table.minus is None else Pin.parse(table.minus)
-    here.steppers.append(StepperSetup(key, Pin.parse(table.step), Pin.parse(table.dir), pulse, minus))
+    here.steppers.append(StepperSetup(key, Pin.parse(table.step), Pin.parse(table.dir), pulse, minus, stops))
     keys[key] = where
     if table.enable is not None:
         axis = axis._replace(enable=f"{key}.enable")

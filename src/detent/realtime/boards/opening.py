@@ -1,0 +1,78 @@
+"""Opening the boards of a plan and waiting until they are ready: before a cell is switched on, or only to look."""
+
+import select
+import time
+from collections.abc import Callable, Sequence
+
+from detent.cell.description import Problem
+from detent.pins import Level
+from detent.realtime.boards.events import Ready, Refusal
+from detent.realtime.boards.plan import Plan
+from detent.realtime.boards.port import Port
+from detent.realtime.boards.setup import SetupProblem
+from detent.realtime.boards.several import Boards
+from detent.realtime.pace import WallNs
+from detent.ticks import MS, SECOND
+
+PATIENCE: WallNs = 10 * SECOND
+
+Sleep = Callable[[Sequence[int], Sequence[int], float], tuple[Sequence[int], Sequence[int]]]
+"""Wait until a descriptor can be read or written, or some seconds have passed: those that can."""
+
+
+def boards_of(plan: Plan, open_port: Callable[[str], Port]) -> Boards:
+    """The boards of a plan with their ports open; nothing is said yet. Raises Problem."""
+    opened: list[Port] = []
+    try:
+        for setup, address in plan.setups:
+            try:
+                opened.append(open_port(address))
+            except OSError as error:
+                raise Problem(plan.file, f"boards.{setup.name}.serial", str(error)) from None
+        try:
+            return Boards([(setup, port) for (setup, _), port in zip(plan.setups, opened, strict=True)])
+        except SetupProblem as problem:
+            raise plan.problem(problem) from None
+    except BaseException:
+        for port in opened:
+            port.close()
+        raise
+
+
+def make_ready(
+    boards: Boards, plan: Plan, wall: Callable[[], WallNs] = time.monotonic_ns, sleep: Sleep | None = None
+) -> dict[str, Level]:
+    """Start the boards and wait until each is ready: the levels of their inputs, by name. Nothing moves.
+
+    Raises Problem where a board refuses, or does not answer in time.
+    """
+    sleep = sleep or _sleep
+    levels: dict[str, Level] = {}
+    began = wall()
+    boards.start(began)
+    while not boards.ready:
+        now = wall()
+        if now - began > PATIENCE:
+            late = next(name for name, board in boards.boards.items() if board.state.value != "ready")
+            what = f"the board does not answer as one with Klipper firmware would, for {PATIENCE // SECOND} s"
+            raise Problem(plan.file, f"boards.{late}.serial", f"{what}: look with detent boards")
+        due = boards.deadline()
+        left = 20 * MS if due is None else min(max(due - now, 0), 20 * MS)
+        readable, writable = sleep(boards.reading(), boards.writing(), left / SECOND)
+        now = wall()
+        for descriptor in readable:
+            boards.receive(descriptor, now)
+        for descriptor in writable:
+            boards.flush(descriptor, now)
+        boards.due(now)
+        for event in boards.events():
+            if isinstance(event, Refusal):
+                raise plan.problem(SetupProblem(event.item or event.board, event.key, event.text))
+            if isinstance(event, Ready):
+                levels |= {name: int(level) for name, level in event.inputs.items()}
+    return levels
+
+
+def _sleep(readers: Sequence[int], writers: Sequence[int], seconds: float) -> tuple[Sequence[int], Sequence[int]]:
+    readable, writable, _ = select.select(readers, writers, (), seconds)
+    return readable, writable
