@@ -133,7 +133,7 @@ def test_what_cannot_be_is_one_line_with_file_key_and_remedy(old: str, new: str,
 
 def test_a_switch_on_another_board_stops_too_late() -> None:
     text = GOOD.replace('[hardware.table]\nboard = "left"\n', '[hardware.table]\nboard = "right"\n')
-    text = text.replace("[boards.left]", '[boards.right]\nserial = "x"\n[boards.left]')
+    text = text.replace("[boards.left]", '[boards.right]\nserial = "x"\nlead = "20 ms"\n[boards.left]')
     moved = text.replace(', "LX+" = "^gpio20"', "").replace('RST = "^gpio30"', 'RST = "^gpio30", "LX+" = "gpio5"')
     cell(text)
     with pytest.raises(Problem, match=r"LX\+ stops table.X, which is on left: a stop on another board comes too late"):

@@ -27,7 +27,7 @@ def no_file(name: str) -> str:
 
 
 def machine_of(described: Description, made: Plan, board: str, switches: Mapping[str, tuple[str, int, int]]) -> Machine:
-    """The machine behind a board: an axis for each stepper; `switches`: UNIT.PIN -> stepper, first and last place low."""
+    """An axis for each stepper of a board, and `switches`: UNIT.PIN -> stepper, first and last place that is low."""
     setup = next(s for s, _ in made.setups if s.name == board)
     axes = {}
     for stepper in setup.steppers:

@@ -96,9 +96,7 @@ def typed(bench: Bench, model: str, text: str, random: Random) -> None:
         bench.send("x", data)
         return
     line = text.format(n=random.randrange(1, 400), s=random.randrange(1, 40), t=random.randrange(40, 100))
-    if line in ("\x1b", "@", "|"):
-        bench.send("x", line.encode())
-    elif model == "bs0610":
+    if line in ("\x1b", "@", "|") or model == "bs0610":
         bench.send("x", line.encode())
     else:
         bench.type("x", line)

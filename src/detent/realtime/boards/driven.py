@@ -95,7 +95,7 @@ class Driven:
         self._input_of = {place: name for name, place in plan.inputs.items()}
         self._raw: dict[str, Level] = {}  # as the boards last said
         self._given: dict[str, Level] = {}  # as the cell was told
-        self._reports: deque[tuple[Action, Ns]] = deque(maxlen=256)  # what inputs gave, and the board's time of it
+        self._reports: deque[tuple[Ns, SetPin, Ns]] = deque(maxlen=256)  # what inputs gave, and the board's time of it
         self._align = 0  # board ns at cell time 0
         self.lines = [HeldLine(cell, number, self._horizon) for number in range(len(cell.lines))]
         self.past = Past(cell, self._counts)
@@ -390,7 +390,7 @@ class Driven:
         """An input has another level, as far as the cell is concerned from now on."""
         unit, pin = self.plan.inputs[name]
         self._given[name] = level
-        self._reports.append((Action(self.cell.now, SetPin(unit, pin, level), outside=True), board_ns))
+        self._reports.append((self.cell.now, SetPin(unit, pin, level), board_ns))
         self.cell.set_pin(unit, pin, level)
         self._absorb()
 
@@ -407,11 +407,12 @@ class Driven:
             at = self.past.moments[0].now if self.past.moments else self.cell.now
         at = min(at, self.cell.now)
         behind = at + self.plan.lead + axle.stepper.lag + CERTAIN + self._align
-        early = [a.deed for a, told in self._reports if a.at > at and told <= behind and a.deed.unit == unit]  # type: ignore[union-attr]
-        moved = [(a.at, a.deed) for a, told in self._reports if a.at > at and a.deed in early]
+        early = [
+            (when, set_) for when, set_, told in self._reports if when > at and told <= behind and set_.unit == unit
+        ]
         level = int(event.level)
-        deeds: list[Deed] = [*early, SetPin(unit, pin, level)]
-        self._take_back(axle, at, deeds, lambda action: (action.at, action.deed) in moved, event.shaft)
+        deeds: list[Deed] = [*(set_ for _, set_ in early), SetPin(unit, pin, level)]
+        self._take_back(axle, at, deeds, lambda action: (action.at, action.deed) in early, event.shaft)
         self._raw[event.input], self._given[event.input] = int(event.present), level
         if int(event.present) != level:
             self._give(event.input, int(event.present), self.clock())
@@ -463,8 +464,9 @@ class Driven:
         for line, count, new in zip(self.lines, counts[len(self.axles) :], heard, strict=True):
             for wrong, right in line.rewind(count, new):
                 self.escaped += 1
-                self._say(Weight.WARNING, f"a host heard {wrong.char.value:#04x} at {wrong.at / 1e9:.4f} s before a stop "
-                          f"took it back{'' if right is None else f'; it would be {right.char.value:#04x}'}")  # fmt: skip
+                instead = "" if right is None else f"; it would be {right.char.value:#04x}"
+                what = f"a host heard {wrong.char.value:#04x} of {wrong.at / 1e9:.4f} s before a stop took it back"
+                self._say(Weight.WARNING, what + instead)
         self._tell_axles(stopped, shaft, motions, counts)
         self.commit()
         for out in self._outs.values():
@@ -518,8 +520,8 @@ class Driven:
 
     def _contradicted(self, axle: Axle, stopped: Axle, lost: int) -> None:
         """Pulses left that the cell did not give after all: it is told where the motor is, and the axis stands."""
-        self._fault(axle, f"{lost} steps left the pins though a stop of {stopped.name} took them back: wires of the cell "
-                    "make it follow too closely; the counter says where it stands")  # fmt: skip
+        what = f"{lost} steps left the pins though a stop of {stopped.name} took them back"
+        self._fault(axle, f"{what}: wires of the cell make it follow too closely; the counter says where it stands")
         self._place(axle, axle.stepper.shaft)
 
     # -- what comes from the boards ----------------------------------------------------------------------
@@ -539,8 +541,9 @@ class Driven:
                     self._place(axle, event.shaft)
             case Slipped(_, stepper, at, by):
                 self._later(self._by_stepper[stepper], at)
-                self._say(Weight.WARNING, f"{stepper} slipped by {show_duration(by)}: the computer was late; no step is "
-                          f"lost ({self._by_stepper[stepper].stepper.slips} slips so far)")  # fmt: skip
+                slips = self._by_stepper[stepper].stepper.slips
+                what = f"{stepper} slipped by {show_duration(by)}: the computer was late; no step is lost"
+                self._say(Weight.WARNING, f"{what} ({slips} {'slip' if slips == 1 else 'slips'} so far)")
             case CountDiffers(_, stepper, shaft, counted):
                 axle = self._by_stepper[stepper]
                 if axle.standing is Standing.DRIVEN:
@@ -608,7 +611,7 @@ class Driven:
                 self._fault(axle, "emergency stop", known=False)
 
     def recover(self) -> list[str]:
-        """Go on from where the motors stand: boards are made ready again, axes at fault are driven. Who is waited for."""
+        """Go on from where the motors stand: boards are made ready again. The axes whose board is waited for."""
         waits = []
         failed = {b for b, board in self.boards.boards.items() if board.state.value not in ("ready",)}
         for axle in self.axles:
@@ -628,14 +631,14 @@ class Driven:
                 self._fault(axle, f"board {event.board} began anew", known=False)
             shaft = event.shafts.get(axle.name)
             if shaft is None:
-                self._say(Weight.WARNING, f"{axle.name}: board {event.board} was restarted, so nobody knows where the motor "
-                          "stands: send it home before anything else")  # fmt: skip
+                what = f"{axle.name}: board {event.board} was restarted, and nobody knows where the motor stands"
+                self._say(Weight.WARNING, f"{what}: send it home before anything else")
                 axle.stepper.adopt(axle.shaft_at(self.cell.now))
             else:
                 self._place(axle, shaft)
                 axle.stepper.rewind(shaft)
-                self._say(Weight.WARNING, f"{axle.name} goes on at {shaft}, as the board has counted; the motor may have "
-                          "lost steps when it was stopped")  # fmt: skip
+                what = f"{axle.name} goes on at {shaft}, as the board has counted"
+                self._say(Weight.WARNING, f"{what}; the motor may have lost steps when it was stopped")
             self._driven_again(axle)
             axle.known = shaft is not None
         for name, level in event.inputs.items():
@@ -660,8 +663,8 @@ class Driven:
         self._pending = True
 
     def _not_written(self, unit: str) -> None:
-        self._say(Weight.WARNING, f"the memory of {unit} could not be written, after it was answered that it was: what it "
-                  "kept before is what it has at the next start")  # fmt: skip
+        what = f"the memory of {unit} could not be written, after it had answered that it was"
+        self._say(Weight.WARNING, f"{what}: at the next start it has what it kept before")
 
     # -- looking -----------------------------------------------------------------------------------------
 
