@@ -1,13 +1,15 @@
-"""What movements of the SUPERSIGMA drive take, by each way of short movements, and what planning them costs.
+"""What movements of the SUPERSIGMA drive take, by each way of short movements, straight lines, and planning them.
 
 Run: python -m bench.supersigma (from the repository). The times of movements are facts of the firmware, in ms on
 average over all short lengths; the baseline is the paper's way.
 """
 
+from functools import partial
+
 import numpy as np
 
 from bench.rows import Row, measure, print_table
-from detent.hosts.interpolation import legs
+from detent.hosts.interpolation import CLOCK_HZ, line
 from detent.ramps.differences import PAPER
 from detent.ramps.short_movements import Way, cuts, family, movement
 from detent.ramps.table_movement import ramped
@@ -17,7 +19,7 @@ BANDS = ((404, 1000), (1000, 2600), (2600, 5144), (404, 5144))
 
 
 def rows() -> list[Row]:
-    return [*time_rows(), *planning_rows()]
+    return [*time_rows(), *planning_rows(), *line_rows()]
 
 
 def time_rows() -> list[Row]:
@@ -61,9 +63,20 @@ def planning_rows() -> list[Row]:
     made.append(
         Row("the whole family and all cuts, once", measure(columns) * 1e3, "ms", "one movement, ms", short / 1e3, None)
     )
-    line = measure(lambda: list(legs((5000, 3217, -1234), 6))) * 1e3
-    one = measure(lambda: list(legs((3000, 2000, 1000), 6))) * 1e3
-    made.append(Row("a line of 5000 by 3217 by 1234", line, "ms", "one leg, ms", one, None))
+    return made
+
+
+def line_rows() -> list[Row]:
+    """Straight lines at 600 half steps/s: how long they take beside the longest axis alone, and planning them."""
+    made = []
+    for distances in ((5000, 3217), (5000, 3217, -1234), (12345, 6789, -321)):
+        text = " by ".join(str(abs(steps)) for steps in distances)
+        runs = line(distances, 6)
+        took, alone = max(run.end for run in runs) / CLOCK_HZ, abs(distances[0]) / 600
+        made.append(Row(f"a line of {text}, {len(runs)} movements", took, "s", "the ideal, s", alone, 1.001 * alone))
+        planned = measure(partial(line, distances, 6)) * 1e3
+        one = measure(partial(line, (5000, 2500), 6)) * 1e3
+        made.append(Row(f"planning it ({text})", planned, "ms", "5000 by 2500, ms", one, None))
     return made
 
 

@@ -1,5 +1,7 @@
 """The SUPERSIGMA's drivers against emulated drives in virtual time."""
 
+from itertools import pairwise
+
 import pytest
 
 from detent.cell.build import build
@@ -52,33 +54,73 @@ def test_the_ccu_drives_several_axes_at_once() -> None:
     assert ccu.wait_for(3)[3].originated
 
 
-def test_a_line_of_several_axes_is_straight_to_less_than_a_step_of_each_pulse_by_pulse() -> None:
-    for distances in ((1000, 700, -333), (500, 17, 0), (-300, 299, 298), (64, -64, 32)):
-        cell, port = robot(switches=False)
-        BlockingCcu(Ccu(), port).move_line(dict(enumerate(distances, 1)))
-        assert positions(cell) == list(distances)
-        check_straight(cell, distances)
+def travelled(cell: Cell, drive: int) -> tuple[list[int], list[int]]:
+    """When each pulse of a drive came, and where it stood behind it."""
+    assert cell.recording is not None
+    times: list[int] = []
+    places: list[int] = []
+    for span in cell.recording.motion(f"m{drive}", cell.now):
+        times += span.train.times(span.first, span.last).tolist()
+        places += [span.shaft + span.direction * n for n in range(span.first, span.last + 1)]
+    return times, places
 
 
 def check_straight(cell: Cell, distances: tuple[int, ...]) -> None:
-    """At every pulse of an axis the longest axis, evenly between its own pulses, is where the line says."""
-    assert cell.recording is not None
-    spans = [cell.recording.motion(f"m{n}", cell.now) for n in range(1, DRIVES + 1)]
+    """At every pulse, by where all axes stand then, in whole numbers: none is a step of its own from the line."""
     lead = max(range(len(distances)), key=lambda axis: abs(distances[axis]))
+    far = abs(distances[lead])
+    events = sorted(
+        (at, axis, place)
+        for axis in range(len(distances))
+        for at, place in zip(*travelled(cell, axis + 1), strict=True)
+    )
+    stands = [0] * len(distances)
+    for at, axis, place in events:
+        stands[axis] = place
+        for other, distance in enumerate(distances):
+            off = abs(stands[other] * distances[lead] - stands[lead] * distance)
+            assert off < far or abs(distance) == far == off, f"drive {other + 1} is {off}/{far} off at {at} ns"
 
-    def lead_at(t: int) -> float:
-        place = 0.0
-        for span in spans[lead]:
-            if span.begins <= t:
-                state = span.train.state_at(t)
-                place = span.shaft + span.direction * (state.steps + state.phase)
-        return place
 
-    for axis, distance in enumerate(distances):
-        for span in spans[axis] if distance else ():
-            for n, t in enumerate(span.train.times().tolist(), 1):
-                ideal = lead_at(t) * distance / distances[lead]
-                assert abs(span.shaft + span.direction * n - ideal) < 1
+@pytest.mark.parametrize(
+    "distances",
+    [(1000, 700, -333), (500, 17, 0), (-300, 299, 298), (64, -64, 32), (2345, 1289, -61), (400, 400, 400), (0, -9, 0)],
+)
+def test_a_line_of_several_axes_is_straight_to_less_than_a_step_pulse_by_pulse(distances: tuple[int, ...]) -> None:
+    cell, port = robot(switches=False)
+    BlockingCcu(Ccu(), port).move_line(dict(enumerate(distances, 1)))
+    assert positions(cell) == list(distances)
+    check_straight(cell, distances)
+
+
+def test_the_longest_axis_of_a_line_never_stops_and_the_line_takes_the_time_of_its_movement() -> None:
+    cell, port = robot(switches=False)
+    BlockingCcu(Ccu(), port).move_line({1: 5000, 2: 3217, 3: -1234})
+    times, _ = travelled(cell, 1)
+    assert {b - a for a, b in pairwise(times)} == {1_666_500}  # ns: N = 3332 at 600 half steps/s
+    assert cell.now < 8.6 * 10**9  # 5000 half steps take 8.33 s
+
+
+@pytest.mark.parametrize(("speed", "fastest"), [(600, 600), (3000, 2000)])
+def test_a_line_of_equal_distances_has_ramps_where_it_is_faster_than_they_begin(speed: int, fastest: int) -> None:
+    distances = (900, -900, 900)
+    cell, port = robot(switches=False)
+    BlockingCcu(Ccu(), port).move_line(dict(enumerate(distances, 1)), speed=speed)
+    assert positions(cell) == list(distances)
+    check_straight(cell, distances)
+    times, _ = travelled(cell, 2)
+    assert min(b - a for a, b in pairwise(times)) >= 10**9 / fastest * 0.999
+
+
+def test_a_line_that_one_axis_leaves_is_stopped_on_all() -> None:
+    cell, port = robot()
+    with pytest.raises(DriveFailed, match="drive 2: met the end of its rail"):
+        BlockingCcu(Ccu(), port).move_line({1: 5000, 2: -1217, 3: 800})
+    cell.run_to(cell.now + 10**9)
+    stood = positions(cell)
+    assert stood[0] < 1000
+    cell.run_to(cell.now + 10 * 10**9)
+    assert positions(cell) == stood
 
 
 def test_a_drive_that_is_not_there_is_given_up() -> None:

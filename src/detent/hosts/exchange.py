@@ -17,7 +17,7 @@ from contextlib import AbstractAsyncContextManager, AbstractContextManager, Asyn
 from functools import partial, update_wrapper
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeAlias, TypeVar, overload
 
-from detent.hosts.errors import NoAnswer, PortLost, Spoken
+from detent.hosts.errors import DriverError, NoAnswer, PortLost, Spoken
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -60,10 +60,14 @@ class Progress(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """What came: the answer to an `Ask`, or, if it is not `whole`, everything that came in its time."""
+    """What came: the answer to an `Ask`, or, if it is not `whole`, everything that came in its time.
+
+    `at` is when an `Ask` that reads was done, in seconds by the clock of the port: only differences count.
+    """
 
     data: bytes = b""
     whole: bool = True
+    at: float = 0.0
 
 
 Step: TypeAlias = Ask | Pause | Rest | Clear | Progress
@@ -85,6 +89,14 @@ def until(end: bytes) -> Callable[[bytes], int | None]:
         return None if place < 0 else place + len(end)
 
     return complete
+
+
+def attempt(steps: Generator[Step, Answer, T]) -> Generator[Step, Answer, T | DriverError]:
+    """The result of `steps`, or the error that ended them, for whoever has to mend things first."""
+    try:
+        return (yield from steps)
+    except DriverError as error:
+        return error
 
 
 class Driver:
@@ -241,8 +253,8 @@ class Blocking(_Shell):
             count = complete(came)
             if count is not None:
                 port.keep(came[count:])
-                return Answer(came[:count])
-        return Answer(came, whole=False)
+                return Answer(came[:count], at=port.clock())
+        return Answer(came, whole=False, at=port.clock())
 
     def close(self) -> None:
         """Close the port, for all who share it."""
@@ -314,8 +326,8 @@ class Asynchronous(_Shell):
             count = complete(came)
             if count is not None:
                 port.keep(came[count:])
-                return Answer(came[:count])
-        return Answer(came, whole=False)
+                return Answer(came[:count], at=port.clock())
+        return Answer(came, whole=False, at=port.clock())
 
     async def close(self) -> None:
         """Close the port, for all who share it."""

@@ -1,34 +1,43 @@
-"""Linear interpolation with drives that know constant speeds in coarse units and start one after the other.
+"""Linear interpolation with drives that know constant speeds in coarse units and take no command while they move.
 
-Several axes go straight from one point to another if their speeds are in the ratio of their distances. A drive of
-the SUPERSIGMA takes speeds in units of 100 half steps/s, so two speeds seldom have just that ratio: the line is cut
-into legs, each from one point of the grid nearest to the line to another, and as long as its speeds allow. What
-counts is where an axis is when the longest axis is somewhere: it must be less than a step from the line.
+Several axes go on a straight line if their speeds are in the ratio of their distances. A drive of the SUPERSIGMA takes
+speeds in units of 100 half steps/s, so two speeds seldom have just that ratio. The longest axis goes the whole way in
+one movement, at one speed, and never stops. Every other axis follows it in movements of its own, a little too fast or
+a little too slow, one after the other: at constant speed there is no ramp between two of them, only the time that the
+CCU needs to see that one has ended and to send the next.
+
+What counts are pulses. Let the longest axis make D steps and another d < D. When it has made x of them the other must
+have made y, with |y - x d/D| < 1: so pulse y may come from pulse floor((y - 1) D/d) + 1 of the longest axis on, and
+before its pulse ceil(y D/d). These are the windows that the movements are fitted into, in whole clocks. Two axes of
+equal distances are a whole step apart between the pulse of one and the pulse of the other; their windows are two
+pulses wide, from pulse y - 1 to pulse y + 1.
 """
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from bisect import bisect_left, insort
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
-UNIT = 100  # half steps/s
-CLOCK_HZ = 2_000_000  # of the rate generators: a speed is a whole number of clocks a step
-LARGEST_SPEED = 255
-MESSAGE_SECONDS = 250e-6  # between the starts of two drives: five bytes on the MICROBUS
-TOLERANCE = 0.98  # steps
+UNIT: Final = 100  # half steps/s
+CLOCK_HZ: Final = 2_000_000  # of the rate generators: a speed is a whole number of clocks a step
+LARGEST_SPEED: Final = 255
+MESSAGE: Final = 500  # clocks that a command of five bytes takes on the bus, as do the two and three of a status
+EXCHANGE: Final = 2 * MESSAGE  # from the question whether a movement has ended to the end of the next command
+BOOKED: Final = 3 * MESSAGE  # the same, and the status of the longest axis behind it
+LATE: Final = 600  # clocks that the CCU may be late with a command
 
 
-class Leg(NamedTuple):
-    """One piece of a line: for each axis its steps, with their sign, and its speed in units (0 if it rests)."""
+class Run(NamedTuple):
+    """One movement of an axis: `at` clocks behind the command of the longest axis its own has been taken."""
 
-    steps: tuple[int, ...]
-    speeds: tuple[int, ...]
+    at: int
+    axis: int
+    steps: int  # with their sign
+    speed: int  # units
 
     @property
-    def seconds(self) -> float:
-        """How long the longest of its movements takes."""
-        return (
-            max(abs(steps) * period(speed) for steps, speed in zip(self.steps, self.speeds, strict=True) if speed)
-            / CLOCK_HZ
-        )
+    def end(self) -> int:
+        """The clock of its last pulse."""
+        return self.at + abs(self.steps) * period(self.speed)
 
 
 def period(speed: int) -> int:
@@ -36,91 +45,121 @@ def period(speed: int) -> int:
     return (2 * CLOCK_HZ // UNIT + speed) // (2 * speed)
 
 
-def legs(distances: Sequence[int], fastest: int, message: float = MESSAGE_SECONDS) -> Iterator[Leg]:
-    """The legs of a straight line by `distances` (signed steps) at no more than `fastest` units on the longest axis.
+def order_of(distances: Sequence[int]) -> list[int]:
+    """The axes that move, longest distance first."""
+    return sorted((axis for axis, steps in enumerate(distances) if steps), key=lambda axis: -abs(distances[axis]))
 
-    Commands of a leg go out longest distance first, `message` seconds apart. ValueError for a speed that no drive has.
+
+def together(distances: Sequence[int], speed: int) -> int:
+    """The speed, in units and no more than `speed`, to which axes of equal distances may go up with their ramps.
+
+    Their movements are the same, one `MESSAGE` after the other, and no step may come to lie between two others. 0 for
+    distances that are not equal: with ramps, speeds are in no ratio.
+    """
+    moving = [abs(steps) for steps in distances if steps]
+    if len(set(moving)) != 1:
+        return 0
+    apart = max((len(moving) - 1) * MESSAGE, 1)
+    return min(speed, (CLOCK_HZ - 1) // (apart * UNIT))
+
+
+def line(distances: Sequence[int], fastest: int) -> list[Run]:
+    """The movements of a straight line by `distances` (signed steps), none above `fastest` units, in order of time.
+
+    The first is that of the longest axis, at 0; those that follow it at every `MESSAGE` clocks go out with it. It is as
+    fast as the others can follow. ValueError for a speed that no drive has.
     """
     if not 1 <= fastest <= LARGEST_SPEED:
         raise ValueError(f"a speed is 1 to {LARGEST_SPEED} times {UNIT} half steps/s, not {fastest}")
     order = order_of(distances)
-    lengths = [abs(distances[axis]) for axis in order]
-    at = [0] * len(lengths)
-    while lengths and at[0] < lengths[0]:
-        leg = _next_leg(lengths, at, fastest, message * CLOCK_HZ)
-        steps, speeds = [0] * len(order), [0] * len(order)
-        for place, axis in enumerate(order):
-            count, speeds[axis] = leg[place]
-            steps[axis] = count if distances[axis] > 0 else -count
-            at[place] += count
-        yield Leg(tuple(steps), tuple(speeds))
+    if not order:
+        return []
+    for speed in range(fastest, 0, -1):
+        runs = _with_lead(distances, order, speed, fastest)
+        if runs is not None:
+            return sorted(runs)
+    raise AssertionError(f"no axis can follow another at {UNIT} half steps/s")
 
 
-def order_of(distances: Sequence[int]) -> list[int]:
-    """The axes in the order in which they are started: longest distance first."""
-    return sorted(range(len(distances)), key=lambda axis: -abs(distances[axis]))
-
-
-def _next_leg(lengths: list[int], at: list[int], fastest: int, message: float) -> list[tuple[int, int]]:
-    """Steps and speed of each axis, longest first, for the longest leg at the highest speed that keeps to the line."""
-    left = lengths[0] - at[0]
-    for most, speed in sorted(((_reach(lengths, speed, left), speed) for speed in range(1, fastest + 1)), reverse=True):
-        for length in range(most, 0, -1):
-            found = _leg(lengths, at, length, speed, message)
-            if found is not None:
-                return found
-    # one step of all that have to go, at one speed, is as near to the line as the grid is
-    return [(_target(lengths, place, at[0] + 1) - at[place], fastest) for place in range(len(lengths))]
-
-
-def _reach(lengths: list[int], speed: int, left: int) -> int:
-    """Steps of the longest axis at `speed` behind which some other must have left the line."""
-    most = left
-    for length in lengths[1:]:
-        slope = length / lengths[0]
-        drift = (
-            min(abs(period(speed) / period(other) - slope) for other in range(1, LARGEST_SPEED + 1)) if length else 0
-        )
-        if drift:
-            most = min(most, max(int(2 / drift), int(2 / slope)) + 1)
-    return most
-
-
-def _target(lengths: list[int], place: int, first: int) -> int:
-    """The step of an axis nearest to the line when the longest axis is at step `first`."""
-    return (2 * first * lengths[place] + lengths[0]) // (2 * lengths[0])
-
-
-def _leg(lengths: list[int], at: list[int], length: int, speed: int, message: float) -> list[tuple[int, int]] | None:
-    """The leg of `length` steps of the longest axis; None if an axis leaves the line by a step."""
-    clocks = length * period(speed)
-    found = [(length, speed)]
-    delay = 0.0
-    for place in range(1, len(lengths)):
-        steps = _target(lengths, place, at[0] + length) - at[place]
-        if not steps:
-            found.append((0, 0))
-            continue
-        delay += message
-        # the speed that ends with the longest axis, or the next: neither may be quicker than that axis
-        wanted = CLOCK_HZ / UNIT * steps / max(clocks - delay, 1.0)
-        fit = [s for s in (int(wanted), int(wanted) + 1) if 1 <= s <= speed] or [min(max(int(wanted), 1), speed)]
-        errors = {s: _error(lengths, at, place, length, speed, steps, s, delay) for s in fit}
-        best = min(fit, key=errors.__getitem__)
-        if errors[best] > TOLERANCE:
+def _with_lead(distances: Sequence[int], order: list[int], speed: int, fastest: int) -> list[Run] | None:
+    """The line with the longest axis at `speed`; None if another cannot follow."""
+    lead = order[0]
+    runs = [Run(0, lead, distances[lead], speed)]
+    booked: list[int] = []  # when the bus is busy with commands: the ends of these, in order
+    begun = (len(order) - 1) * MESSAGE + EXCHANGE
+    for place, axis in enumerate(order[1:], 1):
+        follower = _Follower(abs(distances[lead]), abs(distances[axis]), speed, fastest, booked, begun)
+        found = follower.runs(place * MESSAGE)
+        if found is None:
             return None
-        found.append((steps, best))
-    return found
+        sign = 1 if distances[axis] > 0 else -1
+        runs += [Run(at, axis, sign * steps, own) for at, steps, own in found]
+    return runs
 
 
-def _error(
-    lengths: list[int], at: list[int], place: int, length: int, speed: int, steps: int, own: int, delay: float
-) -> float:
-    """The largest distance from the line, in steps of the axis, as both go on evenly from step to step."""
-    slope = lengths[place] / lengths[0]
-    first, then = period(speed), period(own)
-    worst = 0.0
-    for clock in (0.0, delay, delay + steps * then, float(length * first)):
-        done = min(max(clock - delay, 0.0) / then, steps)
-        worst = max(worst, abs(at[place] + done - slope * (at[0] + min(clock / first, length))))
-    return worst
+class _Follower:
+    """An axis of `steps` steps that follows the longest, of `far` steps at `speed` units."""
+
+    def __init__(self, far: int, steps: int, speed: int, fastest: int, booked: list[int], begun: int) -> None:
+        self.far, self.steps, self.lead, self.booked = far, steps, period(speed), booked
+        self.quickest = period(fastest)
+        self.begun = begun  # the clock from which on the bus is free of the commands that begin the line
+        wanted = speed * steps / far
+        near = range(max(int(wanted) - 1, 1), min(int(wanted) + 3, fastest) + 1)
+        self.speeds = sorted({*near, fastest}, key=lambda own: abs(own - wanted))
+
+    def runs(self, first: int) -> list[tuple[int, int, int]] | None:
+        """When each movement is commanded, its steps, its speed; the first at `first`. None: it cannot follow."""
+        found: list[tuple[int, int, int]] = []
+        done, earliest = 0, first
+        while done < self.steps:
+            choices = [(*self.longest(done, earliest, period(own), fixed=not done), own) for own in self.speeds]
+            most = max(choices, key=lambda choice: choice[0])
+            steps, at, own = most
+            if not steps:
+                return None
+            if done:
+                insort(self.booked, at)
+            found.append((at, steps, own))
+            done += steps
+            earliest = at + steps * period(own) + LATE + EXCHANGE
+        return found
+
+    def longest(self, done: int, earliest: int, clocks: int, *, fixed: bool) -> tuple[int, int]:
+        """The most steps, `clocks` apart, behind the first `done`, and when they are commanded; 0 if there are none."""
+        low, high = earliest, 1 << 62
+        starts: list[int] = []
+        for step in range(1, self.steps - done + 1):
+            low = max(low, self.opens(done + step) - step * clocks)
+            high = min(high, self.closes(done + step) - step * clocks)
+            start = low if fixed else self.free(low)
+            if start + LATE > high or (fixed and start > earliest):
+                break
+            starts.append(start)
+        while starts:
+            steps, start = len(starts), starts[-1]
+            if done + steps == self.steps or self.may_follow(done + steps, start + steps * clocks):
+                return steps, start
+            starts.pop()
+        return 0, 0
+
+    def may_follow(self, done: int, end: int) -> bool:
+        """Whether a movement that ends then leaves time for the next."""
+        return self.free(end + LATE + EXCHANGE) + LATE + self.quickest <= self.closes(done + 1)
+
+    def opens(self, step: int) -> int:
+        """The first clock at which a step may come: behind the pulse of the longest axis that makes room for it."""
+        return ((step - 1) * self.far // self.steps + (self.far > self.steps)) * self.lead + 1
+
+    def closes(self, step: int) -> int:
+        """The last clock at which a step may come: before the pulse of the longest axis that it must not miss."""
+        return (-(-step * self.far // self.steps) + (self.far == self.steps)) * self.lead - 1
+
+    def free(self, at: int) -> int:
+        """The first clock from `at` on at which a command can end: the bus is free for it and what goes with it."""
+        at = max(at, self.begun)
+        place = bisect_left(self.booked, at - BOOKED + 1)
+        while place < len(self.booked) and self.booked[place] < at + BOOKED:
+            at = self.booked[place] + BOOKED
+            place += 1
+        return at

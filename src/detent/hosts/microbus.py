@@ -65,6 +65,7 @@ class BusDriver(Driver):
 
     _patience = PATIENCE
     _in_step = False  # nobody but us has spoken on the bus, as far as is known
+    _at = 0.0  # when the last status was answered, in seconds by the clock of the port
 
     def forget(self) -> None:
         """The connection was lost: another may have spoken, and half a message may be waiting."""
@@ -87,6 +88,7 @@ class BusDriver(Driver):
             yield Clear()
             answer = yield Ask(data, length(ANSWER), self._patience)
             if answer.whole and not answer.data[2] & NO_FLAG:
+                self._at = answer.at
                 return Report(int.from_bytes(answer.data[:2], "big"), answer.data[2])
             self._in_step = False
             if left:

@@ -5,13 +5,13 @@ more. Steps are half steps, with a sign: forward is plus; speeds are half steps/
 answered, so whether a command was taken is known when the drive is asked.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import asin, sqrt
 
 from detent.hosts.axis import POLL, Axis, Limits, Speeds
-from detent.hosts.errors import Busy, MotionFailed
-from detent.hosts.exchange import Ask, Asynchronous, Blocking, Rest, Steps, operation
-from detent.hosts.interpolation import UNIT, legs, order_of
+from detent.hosts.errors import Busy, DriverError, MotionFailed
+from detent.hosts.exchange import Ask, Asynchronous, Blocking, Rest, Steps, attempt, operation
+from detent.hosts.interpolation import CLOCK_HZ, EXCHANGE, MESSAGE, UNIT, Run, line, together
 from detent.hosts.microbus import (
     CONSTANT,
     EMERGENCY,
@@ -29,6 +29,7 @@ from detent.hosts.microbus import (
 )
 
 # The curve of the paper, V = 15000 sin^2(4.54426 t + 0.2097) half steps/s: where ramps begin, and where they end.
+AWAITED = 50  # times that a drive is asked whether a movement has ended that should have
 LOW, TOP, _RATE, _PHASE = 650, 15_000, 4.54426, 0.2097
 
 
@@ -293,23 +294,58 @@ class Ccu(BusDriver):
     def move_line(self, steps: Mapping[int, int], *, speed: int = 600) -> Steps[None]:
         """Move several drives on a straight line and wait until they have arrived, all together.
 
-        The longest axis goes at `speed` half steps/s at most: constant speeds have no ramps, so the motors must be
-        able to start at it. No axis is ever a whole step of its own away from the line.
+        No axis goes faster than `speed` half steps/s: constant speeds have no ramps, so the motors must be able to
+        start at it (only axes of equal distances have the ramps of a speed limit, above 650). The longest axis makes
+        one movement and never stops; the others follow it in movements of their own (`detent.hosts.interpolation`),
+        each of which is sent when the one before has ended.
+
+        Pulse for pulse every axis is less than one step of its own from the line, or one where it goes as far as the
+        longest, if this computer is never later than 0.3 ms with a command; else it is as much more as the axis makes
+        steps in the rest of the time. If a drive does not do what it is told, all are stopped.
+
+        Raises DriveFailed, Busy, NoAnswer, ValueError.
         """
         fastest = speed_units(speed)
         drives = [drive for drive, count in steps.items() if count]
-        distances = [steps[drive] for drive in drives]
-        for drive, count in zip(drives, distances, strict=True):
-            message(drive, CONSTANT, count, speed)
-        order = order_of(distances)
-        for leg in legs(distances, fastest):
-            started = [place for place in order if leg.steps[place]]
-            # One write, so that the drives start one message apart, as the legs are reckoned.
-            yield Ask(b"".join(
-                message(drives[place], CONSTANT, leg.steps[place], leg.speeds[place] * UNIT) for place in started
-            ))  # fmt: skip
-            yield Rest(leg.seconds)
-            yield from self.wait_for(*(drives[place] for place in started))
+        for drive in drives:
+            message(drive, CONSTANT, steps[drive], speed)
+        for drive in drives:
+            yield from self._ready(drive)
+        limit = together([steps[drive] for drive in drives], fastest) * UNIT
+        try:
+            if limit > LOW:
+                yield Ask(b"".join(message(drive, LIMIT, steps[drive], limit) for drive in drives))
+            else:
+                yield from self._follow(drives, line([steps[drive] for drive in drives], fastest))
+            yield from self.wait_for(*drives)
+        except DriverError:
+            for drive in drives:
+                yield from attempt(self._stopped(drive, STOP))
+            raise
+
+    def _follow(self, drives: Sequence[int], runs: Sequence[Run]) -> Steps[None]:
+        """Send each movement of a line at its time, when the one before of its drive has ended; wait for the last."""
+        commands = [message(drives[run.axis], CONSTANT, run.steps, run.speed * UNIT) for run in runs]
+        first = sum(run.at == place * MESSAGE for place, run in enumerate(runs[: len(drives)]))
+        began = self._at + MESSAGE / CLOCK_HZ
+        # one write, so that the drives start one message apart, as the line is reckoned
+        yield Ask(b"".join(commands[:first]))
+        self._at += first * MESSAGE / CLOCK_HZ
+        for run, command in zip(runs[first:], commands[first:], strict=True):
+            yield Rest(max(began + (run.at - EXCHANGE) / CLOCK_HZ - self._at, 0.0))
+            yield from self._ended(drives[run.axis])
+            yield Ask(command)
+            _check(drives[runs[0].axis], (yield from self._status(drives[runs[0].axis])))
+        yield Rest(max(began + max((run.end for run in runs), default=0) / CLOCK_HZ - self._at, 0.0))
+
+    def _ended(self, drive: int) -> Steps[None]:
+        """See that the movement of a drive has ended, which it should have by now. Raises DriveFailed."""
+        for _ in range(AWAITED):
+            report = yield from self._status(drive)
+            _check(drive, report)
+            if not report.moving:
+                return
+        raise DriveFailed(drive, "still moves: its clock is not that of the other drives", report)
 
     def _all(self, steps: Mapping[int, int], start: Callable[[int], bytes]) -> Steps[dict[int, Report]]:
         drives = [drive for drive, count in steps.items() if count]

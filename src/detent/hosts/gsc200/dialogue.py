@@ -5,17 +5,14 @@ damaged or lost, the module may have obeyed: then only what may safely be obeyed
 """
 
 import re
-from collections.abc import Generator
 from enum import Enum
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple
 
 from detent.hosts.axis import Axis
 from detent.hosts.errors import BadAnswer, Busy, DriverError, MotionFailed, NoAnswer, Refused, Spoken
-from detent.hosts.exchange import Answer, Ask, Clear, Pause, Step, Steps, operation
+from detent.hosts.exchange import Answer, Ask, Clear, Pause, Steps, operation
 from detent.hosts.gsc200.frames import LINE_BITS, Frames
 from detent.hosts.gsc200.language import GS_C200S, MODELS
-
-T = TypeVar("T")
 
 ERRORS: Final = {
     "E1": "parity error when receiving one or more characters, checksum error, or too long a command string",
@@ -226,11 +223,3 @@ class Dialogue(Axis):
 def len_or_none(data: bytes) -> int | None:
     """Complete as soon as anything is there, with all of it."""
     return len(data) or None
-
-
-def attempt(steps: Generator[Step, Answer, T]) -> Generator[Step, Answer, T | DriverError]:
-    """The result of `steps`, or the error that ended them, for whoever has to mend things first."""
-    try:
-        return (yield from steps)
-    except DriverError as error:
-        return error

@@ -8,10 +8,10 @@ from typing import NoReturn
 
 from detent.hosts.axis import Speeds
 from detent.hosts.errors import BadAnswer, Busy, DriverError, NoAnswer, Refused
-from detent.hosts.exchange import Asynchronous, Blocking, Progress, Steps, operation
+from detent.hosts.exchange import Asynchronous, Blocking, Progress, Steps, attempt, operation
 from detent.hosts.gsc200 import language
 from detent.hosts.gsc200.commands import Commands
-from detent.hosts.gsc200.dialogue import TRIES, Again, attempt
+from detent.hosts.gsc200.dialogue import TRIES, Again
 
 LEAVING = (
     "it is in programming mode, which a GS-C200 leaves only by execute() (E), and that starts the program; "
