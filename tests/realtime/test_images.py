@@ -82,7 +82,9 @@ def test_what_was_saved_is_there_the_next_time(tmp_path: Path) -> None:
     images = Kept(tmp_path)
     assert images.load() == ({"drill": IMAGE}, [])
     images.close()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["cell.drill.eeprom", "cell.lock"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "cell.drill.eeprom", "cell.drill.eeprom.old", "cell.lock",
+    ]  # fmt: skip
 
 
 def test_a_damaged_image_is_moved_aside_and_never_overwritten(images: Kept) -> None:
@@ -191,3 +193,159 @@ def test_images_are_kept_where_the_system_keeps_state() -> None:
     assert default_folder({"XDG_STATE_HOME": "/var/state"}) == Path("/var/state/detent")
     assert default_folder({"XDG_STATE_HOME": "not/absolute"}) == Path.home() / ".local/state/detent"
     assert default_folder({}) == Path.home() / ".local/state/detent"
+
+
+# -- whose images they are -----------------------------------------------------------------------------------
+
+UNITS = {"u": "gs-c200"}
+
+
+def opened(state: Path, cell: Path, models: dict[str, str] = UNITS) -> tuple[Images, list[str], dict[str, bytes]]:
+    images = Images.of(state, str(cell), models, is_file=True)
+    found = images.load()
+    images.close()
+    return images, found.reports, found.images
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Path:
+    """A cell file whose unit has kept an image."""
+    file = tmp_path / "a" / "mm.toml"
+    file.parent.mkdir()
+    file.write_text("x")
+    images, reports, found = opened(tmp_path / "state", file)
+    assert (reports, found) == ([], {})
+    assert images.path("u").name == "mm.u.eeprom"
+    assert images.save("u", IMAGE)
+    return file
+
+
+@pytest.mark.parametrize("to", ["b/mm.toml", "a/other.toml", "b/other.toml"])
+def test_a_cell_that_is_moved_or_renamed_finds_its_images_again(cell: Path, tmp_path: Path, to: str) -> None:
+    new = tmp_path / to
+    new.parent.mkdir(exist_ok=True)
+    cell.rename(new)
+    for said in (1, 0):
+        _, reports, found = opened(tmp_path / "state", new)
+        assert found == {"u": IMAGE}
+        assert len(reports) == said
+    assert f'path = "{new}"' in (tmp_path / "state" / "mm.cell").read_text()
+
+
+def test_a_cell_that_is_moved_by_copying_finds_them_by_its_name_and_its_units(cell: Path, tmp_path: Path) -> None:
+    new = tmp_path / "mm.toml"
+    new.write_text("x")
+    cell.unlink()
+    _, reports, found = opened(tmp_path / "state", new)
+    assert found == {"u": IMAGE}
+    assert reports == [f"{new} was {cell}: its EEPROM images {tmp_path}/state/mm.*.eeprom are used"]
+
+
+def test_a_copy_of_a_cell_begins_empty_and_is_told_whose_the_images_are(cell: Path, tmp_path: Path) -> None:
+    new = tmp_path / "mm.toml"
+    new.write_text("x")
+    images, reports, found = opened(tmp_path / "state", new)
+    assert found == {}
+    assert images.path("u").name == "mm-2.u.eeprom"
+    assert reports == [
+        f"{new} begins with empty EEPROMs: {tmp_path}/state/mm.*.eeprom are those of {cell}, which is there still"
+    ]
+    assert opened(tmp_path / "state", cell)[2] == {"u": IMAGE}
+
+
+def test_what_is_not_certain_is_told_with_the_way_to_use_it(cell: Path, tmp_path: Path) -> None:
+    """Another name, and another file on the disk: perhaps the same cell, perhaps not."""
+    new = tmp_path / "other.toml"
+    new.write_text("x")
+    cell.unlink()
+    _, reports, found = opened(tmp_path / "state", new)
+    assert found == {}
+    assert f"if it was {cell}, its images are {tmp_path}/state/mm.*.eeprom: write its path into" in reports[0]
+    (tmp_path / "state" / "other.cell").unlink()
+    key = tmp_path / "state" / "mm.cell"
+    key.write_text(key.read_text().replace(str(cell), str(new)))
+    assert opened(tmp_path / "state", new)[2] == {"u": IMAGE}
+
+
+def test_two_cells_of_one_name_are_served_side_by_side_before_either_has_an_image(tmp_path: Path) -> None:
+    made = []
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        file = tmp_path / folder / "mm.toml"
+        file.write_text("x")
+        made.append(Images.of(tmp_path / "state", str(file), UNITS, is_file=True))
+    assert [images.path("u").name for images in made] == ["mm.u.eeprom", "mm-2.u.eeprom"]
+    for images in made:
+        images.close()
+
+
+def test_images_under_their_old_name_of_digits_are_taken_over(tmp_path: Path) -> None:
+    file = tmp_path / "mm.toml"
+    file.write_text("x")
+    (tmp_path / "state").mkdir()
+    (tmp_path / "state" / f"{cell_name(str(file), is_file=True)}.u.eeprom").write_bytes(pack(IMAGE, "gs-c200"))
+    assert opened(tmp_path / "state", file)[2] == {"u": IMAGE}
+
+
+def test_a_key_that_cannot_be_read_is_nobodys(cell: Path, tmp_path: Path) -> None:
+    (tmp_path / "state" / "mm.cell").write_bytes(b"\xff = [")
+    images, _, found = opened(tmp_path / "state", cell)
+    assert found == {}
+    assert images.path("u").name == "mm-2.u.eeprom"
+
+
+def test_another_models_image_gets_the_name_of_that_and_comes_back_with_it(tmp_path: Path) -> None:
+    def kept(model: str) -> tuple[dict[str, bytes], list[str], Images]:
+        images = Images(tmp_path, "cell", {"u": model})
+        found = images.load()
+        images.close()
+        return found.images, found.reports, images
+
+    kept("gs-c200s")[2].save("u", b"s")
+    found, reports, images = kept("gs-c200")
+    assert found == {}
+    apart = tmp_path / "cell.u.gs-c200s.eeprom"
+    path = tmp_path / "cell.u.eeprom"
+    assert reports == [
+        f"{path}: it belongs to a gs-c200s, not a gs-c200; it is {apart} now, and is used again when u is a gs-c200s"
+    ]
+    images.save("u", b"c")
+    assert kept("gs-c200s")[0] == {"u": b"s"}
+    assert kept("gs-c200")[0] == {"u": b"c"}
+    assert not list(tmp_path.glob("*damaged*"))
+
+
+@pytest.mark.parametrize("kind", ["pipe", "link", "huge"])
+def test_what_is_no_file_that_an_image_could_be_is_refused_at_once(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "cell.bar.eeprom"
+    match kind:
+        case "pipe":
+            os.mkfifo(path)
+        case "link":
+            path.symlink_to(tmp_path / "elsewhere")
+        case "huge":
+            with path.open("wb") as file:
+                file.truncate(2 << 30)
+    with pytest.raises(ImagesUnusable, match=r"and no EEPROM image: move it away, or .* --state DIR"):
+        Kept(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["cell.bar.eeprom.new", "cell.bar.eeprom.older", "cell.bar.eeprom"])
+def test_a_save_follows_no_link(images: Kept, tmp_path: Path, name: str) -> None:
+    precious = tmp_path / "precious"
+    precious.write_text("mine")
+    images.save("bar", b"first")
+    (tmp_path / name).unlink(missing_ok=True)
+    (tmp_path / name).symlink_to(precious)
+    assert images.save("bar", IMAGE)
+    assert precious.read_text() == "mine"
+    assert images.load().images == {"bar": IMAGE}
+
+
+def test_the_image_before_the_last_is_kept_and_named_when_that_is_damaged(images: Kept) -> None:
+    for content in (b"first", b"second"):
+        assert images.save("bar", content)
+    old = images.path("bar").with_name("cell.bar.eeprom.old")
+    assert unpack(old.read_bytes(), "gs-c200") == b"first"
+    images.path("bar").write_bytes(b"?")
+    assert images.load().reports[0].endswith(f"{old} is the image before it: rename it to use it")

@@ -77,7 +77,7 @@ def serve(
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
     from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost
-    from detent.realtime.images import Images, ImagesUnusable, cell_name, default_folder
+    from detent.realtime.images import Images, ImagesUnusable, default_folder
     from detent.realtime.service import Service, models
 
     links = list(pty) if pty is not None else None
@@ -92,8 +92,7 @@ def serve(
         control_at = None if control is None else _address("--control", control)
         found = find(target, straps=strap, options=set_, pins=pin)
         folder = state if state is not None else default_folder()
-        name = cell_name(target, is_file=bool(found.description.file))
-        images = Images(folder, name, models(found.description))
+        images = Images.of(folder, target, models(found.description), is_file=bool(found.description.file))
     except (Problem, ImagesUnusable) as error:
         asked_wrongly(error)
     try:

@@ -1,7 +1,8 @@
 """EEPROM images on disk: what a unit keeps while it is off, one file for each unit.
 
-A file is written whole or not at all. One that is damaged is moved aside, never used and never overwritten.
-One process at a time has the images of a cell: a lock beside them says so.
+A file is written whole or not at all, and the image before it is kept as ``.old``. One that is damaged is moved aside,
+never used and never overwritten; one of another model gets the name of that, and its unit finds it again when it is
+such a model once more. One process at a time has the images of a cell: a lock beside them says so.
 
 Layout, numbers big-endian: ``89 44 54 4E 54 0D 0A 1A``, version (2 bytes), length of the model's name (2),
 length of the image (4), the name in UTF-8, the image, CRC-32 of everything before (4).
@@ -11,15 +12,19 @@ import contextlib
 import fcntl
 import hashlib
 import os
-import re
+import stat
 import struct
 import sys
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
+from detent.realtime.belonging import SUFFIX, claim, safe
+
+MOST_BYTES = 1 << 20  # of a file: the memories of the controllers have thousands
+REMEDY = "choose another place with --state DIR"
 MAGIC = b"\x89DTNT\r\n\x1a"
 VERSION = 1
 _HEAD = struct.Struct(">8sHHI")
@@ -34,8 +39,16 @@ class ImageUnreadable(ValueError):
     """A file that is no whole image of this model. The text says what is wrong with it."""
 
 
+class OtherModel(ImageUnreadable):
+    """A whole image, of another model."""
+
+    def __init__(self, written_by: str, model: str) -> None:
+        super().__init__(f"it belongs to a {written_by}, not a {model}")
+        self.written_by = written_by
+
+
 class Loaded(NamedTuple):
-    """The images that were kept, by unit, and a line of text about each that was moved aside."""
+    """The images that were kept, by unit, and a line of text about each that was moved, aside or back."""
 
     images: dict[str, bytes]
     reports: list[str]
@@ -50,15 +63,15 @@ def default_folder(environment: Mapping[str, str] = os.environ) -> Path:
 
 
 def cell_name(target: str, *, is_file: bool) -> str:
-    """The name that the images of a cell begin with.
+    """A name for what is kept of a cell, other than its images, which `belonging` names.
 
     A model gives its own name. A cell file gives its stem and eight digits made of its absolute path, so that
-    two files of one name do not share images; a file that is moved starts with empty ones.
+    two files of one name share nothing.
     """
     if not is_file:
-        return _safe(target)
+        return safe(target)
     path = Path(target).resolve()
-    return f"{_safe(path.stem)}-{hashlib.sha256(os.fsencode(path)).hexdigest()[:8]}"
+    return f"{safe(path.stem)}-{hashlib.sha256(os.fsencode(path)).hexdigest()[:8]}"
 
 
 class Images:
@@ -71,13 +84,26 @@ class Images:
         models: Mapping[str, str],
         *,
         warn: Callable[[str], None] = lambda text: print(f"detent: {text}", file=sys.stderr, flush=True),
+        reports: Sequence[str] = (),
     ) -> None:
-        """Take the images into possession. Raises ImagesUnusable."""
+        """Take the images into possession. Raises ImagesUnusable. `reports` are told with what `load` finds."""
         self._models = dict(models)
-        self._paths = {unit: folder / f"{cell}.{_safe(unit)}.eeprom" for unit in models}
+        self._reports = list(reports)
+        self._paths = {unit: folder / f"{cell}.{safe(unit)}{SUFFIX}" for unit in models}
+        for path in self._paths.values():
+            _check_kind(path)
         self._warn = warn
         self._warned: set[Path] = set()
         self._lock = _locked(folder, folder / f"{cell}.lock")
+
+    @classmethod
+    def of(cls, folder: Path, target: str, models: Mapping[str, str], *, is_file: bool) -> Self:
+        """The images of a cell file, found again when it was moved, or of a model. Raises ImagesUnusable."""
+        try:
+            found = claim(folder, target, models, is_file=is_file)
+        except OSError as error:
+            raise ImagesUnusable(f"EEPROM images cannot be kept in {folder}: {error.strerror}; {REMEDY}") from error
+        return cls(folder, found.name, models, reports=found.reports)
 
     def path(self, unit: str) -> Path:
         """The file of a unit."""
@@ -85,10 +111,18 @@ class Images:
 
     def load(self) -> Loaded:
         """Read what is there. What cannot be read is moved aside, and its unit starts empty."""
-        found = Loaded({}, [])
+        found = Loaded({}, self._reports)
+        self._reports = []
         for unit, path in self._paths.items():
+            model = self._models[unit]
             try:
-                found.images[unit] = unpack(path.read_bytes(), self._models[unit])
+                try:
+                    found.images[unit] = unpack(_read(path), model)
+                except OtherModel as other:
+                    found.reports.append(self._set_apart(unit, other))
+                    found.images[unit] = self._taken_back(unit, found.reports)
+                except FileNotFoundError:
+                    found.images[unit] = self._taken_back(unit, found.reports)
             except FileNotFoundError:
                 continue
             except OSError as error:
@@ -97,15 +131,38 @@ class Images:
                 found.reports.append(self.set_aside(unit, str(error)))
         return found
 
+    def _of_model(self, unit: str, model: str) -> Path:
+        """Where the image of a unit waits that is another model now."""
+        path = self._paths[unit]
+        return path.with_name(f"{path.name.removesuffix(SUFFIX)}.{safe(model)}{SUFFIX}")
+
+    def _set_apart(self, unit: str, other: OtherModel) -> str:
+        """Give the image of another model the name of that; return a line about it."""
+        path, apart = self._paths[unit], self._of_model(unit, other.written_by)
+        if os.path.lexists(apart):  # somebody put one there: it is an older one
+            apart.rename(_unused(apart, "old"))
+        path.rename(apart)
+        return f"{path}: {other}; it is {apart} now, and is used again when {unit} is a {other.written_by}"
+
+    def _taken_back(self, unit: str, reports: list[str]) -> bytes:
+        """The image that the unit kept when it was this model before. Raises FileNotFoundError."""
+        path, apart = self._paths[unit], self._of_model(unit, self._models[unit])
+        image = unpack(_read(apart), self._models[unit])
+        apart.rename(path)
+        reports.append(f"{apart} is {path} again: {unit} is a {self._models[unit]}")
+        return image
+
     def set_aside(self, unit: str, why: str) -> str:
         """Move a damaged image out of the way, under the next free number; return a line about it."""
         path = self._paths[unit]
-        aside = next(p for n in count(1) if not os.path.lexists(p := path.with_name(f"{path.name}.damaged-{n}")))
+        aside = _unused(path, "damaged")
         try:
             path.rename(aside)
         except OSError as error:
             return f"{path}: {why}; it cannot be moved aside ({error.strerror}), and {unit} starts empty"
-        return f"{path}: {why}; it is {aside} now, and {unit} starts empty"
+        old = path.with_name(f"{path.name}.old")
+        hint = f"; {old} is the image before it: rename it to use it" if old.is_file() else ""
+        return f"{path}: {why}; it is {aside} now, and {unit} starts empty{hint}"
 
     def save(self, unit: str, image: bytes) -> bool:
         """Keep `image`; False if that failed, and then the old one is still there. Warns once for each file."""
@@ -151,50 +208,79 @@ def unpack(data: bytes, model: str) -> bytes:
         raise ImageUnreadable("its checksum is wrong")
     written_by = body[_HEAD.size : _HEAD.size + name_length].decode("utf-8", "replace")
     if written_by != model:
-        raise ImageUnreadable(f"it belongs to a {written_by}, not a {model}")
+        raise OtherModel(written_by, model)
     return body[_HEAD.size + name_length :]
 
 
-def _safe(name: str) -> str:
-    """`name` as part of a file name; a name that had to be changed is told apart by digits made of it."""
-    safe = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:64]
-    return safe if safe == name else f"{safe}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+def _unused(path: Path, what: str) -> Path:
+    """`path` with the first number behind it that nothing has."""
+    return next(p for n in count(1) if not os.path.lexists(p := path.with_name(f"{path.name}.{what}-{n}")))
+
+
+def _check_kind(path: Path) -> None:
+    """Raise ImagesUnusable for what is no file that an image could be: it would be waited for, or read for ever."""
+    try:
+        found = path.lstat()
+    except OSError:
+        return
+    kinds = {stat.S_IFIFO: "a pipe", stat.S_IFLNK: "a symbolic link", stat.S_IFSOCK: "a socket",
+             stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}  # fmt: skip
+    what = kinds.get(stat.S_IFMT(found.st_mode), "")
+    if not what and found.st_size > MOST_BYTES:
+        what = f"a file of {found.st_size} bytes"
+    if what:
+        raise ImagesUnusable(f"{path} is {what} and no EEPROM image: move it away, or {REMEDY}")
+
+
+def _read(path: Path) -> bytes:
+    """The content of an image's file, no link followed and nothing waited for. Raises OSError."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(descriptor, "rb") as file:
+        return file.read(MOST_BYTES + 1)
 
 
 def _locked(folder: Path, path: Path) -> int:
     """The descriptor of the locked file `path`."""
-    remedy = "choose another place with --state DIR"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
     except OSError as error:
-        raise ImagesUnusable(f"EEPROM images cannot be kept in {folder}: {error.strerror}; {remedy}") from error
+        raise ImagesUnusable(f"EEPROM images cannot be kept in {folder}: {error.strerror}; {REMEDY}") from error
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         os.close(descriptor)
-        raise ImagesUnusable(f"{path} is locked: another process serves these units; end it, or {remedy}") from error
+        raise ImagesUnusable(f"{path} is locked: another process serves these units; end it, or {REMEDY}") from error
     except OSError as error:
         os.close(descriptor)
-        raise ImagesUnusable(f"{path} cannot be locked: {error.strerror}; {remedy}") from error
+        raise ImagesUnusable(f"{path} cannot be locked: {error.strerror}; {REMEDY}") from error
     return descriptor
 
 
 def _write_whole(path: Path, data: bytes) -> None:
     """Make `data` the content of `path`, also across a power failure: the file is the old one or the new one.
 
-    Nobody else writes here (the lock), so a temporary file of an earlier failure may be overwritten.
+    The one before it stays as ``.old``. Nobody else writes here (the lock), so what an earlier failure has left under a
+    temporary name is removed; no link is followed.
     """
-    temporary = path.with_name(f"{path.name}.new")
+    temporary, older = path.with_name(f"{path.name}.new"), path.with_name(f"{path.name}.older")
     try:
-        with open(temporary, "wb") as file:
+        for left in (temporary, older):
+            left.unlink(missing_ok=True)
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        with os.fdopen(descriptor, "wb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
+        with contextlib.suppress(OSError):  # the first image, or a file system without such links
+            os.link(path, older, follow_symlinks=False)
         os.replace(temporary, path)
+        with contextlib.suppress(FileNotFoundError):
+            os.replace(older, path.with_name(f"{path.name}.old"))
     except OSError:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
+        for left in (temporary, older):
+            with contextlib.suppress(OSError):
+                left.unlink()
         raise
     with contextlib.suppress(OSError):  # the image is in place; a file system that cannot do more is what it is
         folder = os.open(path.parent, os.O_RDONLY)

@@ -226,7 +226,7 @@ class Bench:
         name = cell_name(str(target), is_file=bool(description.file))
         same = sum(other == name and serving.alive for other, serving in self._open)
         folder = self.folder / (f"eeprom-{same + 1}" if same else "eeprom")  # two at once have their own
-        images = Images(folder, name, models(description))
+        images = Images.of(folder, str(target), models(description), is_file=bool(description.file))
         wanted: Sequence[Wanted] = [Wanted("pty"), *([Wanted("tcp", "127.0.0.1:0")] if tcp else [])]
         beside = Path(description.file).parent if description.file else Path()
         try:

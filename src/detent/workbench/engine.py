@@ -25,7 +25,7 @@ from detent.lines.line import Line
 from detent.outputs.units import views
 from detent.pins import Level
 from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
-from detent.realtime.images import Images, ImagesUnusable, cell_name
+from detent.realtime.images import Images, ImagesUnusable
 from detent.realtime.loop import BEHIND, Loop, ServedLine, stopped_by_signals, wake_exactly
 from detent.realtime.pace import Lateness as Counted
 from detent.realtime.pace import Pace, WallNs
@@ -96,7 +96,7 @@ class Engine:
         folder = self._order.state_dir
         if folder is None:
             return None
-        return Images(folder, cell_name(self._order.target, is_file=bool(description.file)), models(description))
+        return Images.of(folder, self._order.target, models(description), is_file=bool(description.file))
 
     def _begin(self, found: Target) -> Cell:
         """A new cell, with nothing behind it."""

@@ -1,0 +1,155 @@
+"""Which EEPROM images in a folder are those of a cell: they are found again when its file is moved or renamed.
+
+The images of a cell are `NAME.UNIT.eeprom`. NAME is the stem of its file, with a number where another cell has it;
+`NAME.cell` beside them says in words whose they are: the path of the cell file, which file that was on its disk, and
+the units with their models. People may edit it.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from itertools import count
+from pathlib import Path
+from typing import NamedTuple
+
+from detent.controllers.catalogue import MODELS
+
+SUFFIX = ".eeprom"
+_MOST_KEY = 1 << 20  # bytes of a NAME.cell
+_HEAD = "# Whose EEPROM images these are: the files of this name with .UNIT.eeprom. Cell moved: its path here.\n"
+
+
+class Key(NamedTuple):
+    """What a `NAME.cell` says."""
+
+    name: str
+    path: str
+    file: str  # device and inode
+    units: str  # unit and model, in order of their names
+
+
+class Claim(NamedTuple):
+    """The NAME of a cell, and what there is to tell about it."""
+
+    name: str
+    reports: list[str]
+
+
+def claim(folder: Path, target: str, models: Mapping[str, str], *, is_file: bool) -> Claim:
+    """The name under which `folder` keeps the images of a cell; a model gives its own. Raises OSError."""
+    if not is_file:
+        return Claim(safe(target), [])
+    path = Path(target).resolve()
+    stem = safe(path.stem)
+    units = ", ".join(f"{unit} {model}" for unit, model in sorted(models.items()))
+    folder.mkdir(parents=True, exist_ok=True)
+    with _alone(folder):
+        keys = list(_keys(folder))
+        own = next((key for key in keys if key.path == str(path)), None)
+        reports: list[str] = []
+        if own is None:
+            own = _left_behind([key for key in keys if _has_images(folder, key.name)], path, units, folder, reports)
+        if own is None:
+            taken = {key.name for key in keys if os.path.lexists(key.path)} | set(MODELS)
+            name = _free(folder, stem, taken)
+            _take_old_names(folder, f"{stem}-{hashlib.sha256(os.fsencode(path)).hexdigest()[:8]}", name)
+        else:
+            name = own.name
+        _write_key(folder, Key(name, str(path), _file(path), units))
+    return Claim(name, reports)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """No other process looks for a name meanwhile."""
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+    descriptor = os.open(folder / "cells.lock", flags, 0o666)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def safe(name: str) -> str:
+    """`name` as part of a file name; a name that had to be changed is told apart by digits made of it."""
+    changed = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:64]
+    return changed if changed == name else f"{changed}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
+def _left_behind(keys: list[Key], path: Path, units: str, folder: Path, reports: list[str]) -> Key | None:
+    """The images of a cell file that is gone, if it is this one that was moved; what is not certain is reported."""
+    gone = [key for key in keys if not os.path.lexists(key.path)]
+    moved = [key for key in gone if key.file == _file(path)]
+    moved = moved or [key for key in gone if key.units == units and Path(key.path).stem == path.stem]
+    if len(moved) == 1:
+        reports.append(f"{path} was {moved[0].path}: its EEPROM images {folder / moved[0].name}.*{SUFFIX} are used")
+        return moved[0]
+    for key in keys:
+        images = f"{folder / key.name}.*{SUFFIX}"
+        if key in gone and key.units == units:
+            what = f"if it was {key.path}, its images are {images}: write its path into {folder / key.name}.cell"
+            reports.append(f"{path} begins with empty EEPROMs; {what}")
+        elif key not in gone and Path(key.path).stem == path.stem:
+            reports.append(f"{path} begins with empty EEPROMs: {images} are those of {key.path}, which is there still")
+    return None
+
+
+def _free(folder: Path, stem: str, taken: set[str]) -> str:
+    """A name that no other cell has."""
+    names = (stem if number == 1 else f"{stem}-{number}" for number in count(1))
+    return next(name for name in names if name not in taken and not _has_images(folder, name))
+
+
+def _has_images(folder: Path, name: str) -> bool:
+    return bool(_images(folder, name))
+
+
+def _images(folder: Path, name: str) -> list[Path]:
+    """Everything that is kept under the name of a cell: its images, older ones, damaged ones."""
+    begin = f"{name}."
+    return [folder / file for file in os.listdir(folder) if file.startswith(begin) and SUFFIX in file[len(begin) - 1 :]]
+
+
+def _take_old_names(folder: Path, before: str, name: str) -> None:
+    """Images that were named by digits made of the path get the name that people can read."""
+    for image in _images(folder, before):
+        image.rename(image.with_name(image.name.replace(before, name, 1)))
+
+
+def _file(path: Path) -> str:
+    try:
+        found = path.stat()
+    except OSError:
+        return ""
+    return f"{found.st_dev}:{found.st_ino}"
+
+
+def _keys(folder: Path) -> Iterator[Key]:
+    """Every `NAME.cell` that can be read."""
+    for place in sorted(folder.glob("*.cell")):
+        try:
+            with place.open("rb") as file:
+                facts = tomllib.loads(file.read(_MOST_KEY).decode())
+            yield Key(place.name.removesuffix(".cell"), str(facts["path"]), str(facts["file"]), str(facts["units"]))
+        except (OSError, ValueError, KeyError, RecursionError):
+            continue
+
+
+def _write_key(folder: Path, key: Key) -> None:
+    place = folder / f"{key.name}.cell"
+    text = _HEAD + "".join(f"{name} = {json.dumps(value)}\n" for name, value in key._asdict().items() if name != "name")
+    with suppress(OSError, UnicodeDecodeError):
+        if not place.is_symlink() and place.read_text("utf-8") == text:
+            return
+    temporary = place.with_name(f"{place.name}.new")
+    temporary.unlink(missing_ok=True)
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
+    with os.fdopen(descriptor, "w", encoding="utf-8", errors="surrogateescape") as file:
+        file.write(text)
+    temporary.replace(place)
