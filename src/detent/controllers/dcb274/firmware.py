@@ -368,6 +368,7 @@ class Dcb274:
         self.advance(now)
         self._quiet = False
         if self._powered:
+            self._inbox.clear()
             self._interrupt(ord("|"), now)
             self._poll(now)
 
@@ -494,17 +495,15 @@ class Dcb274:
             self._motion.halt(now)
             self._running.reset()
             self.spend_contacts()
-            self._inbox.clear()
             if self._desk.closed or self._desk.setting_off:
                 self._desk.cancel(now)
 
     def _soft_stop(self, now: Ns) -> None:
         """@ or the soft stop input: decelerate; a program ends, a pending command is cancelled (page 28).
 
-        So is a command that executes and would set off a motion at the end of its time, and what was typed ahead.
+        So is a command that executes and would set off a motion at the end of its time.
         """
         self.spend_contacts()
-        self._inbox.clear()
         if self._running.active:
             self._running.soft_stop(now)
         elif self._desk.closed or self._desk.setting_off:
@@ -538,7 +537,9 @@ class Dcb274:
     # -- the idle state ----------------------------------------------------------------------------------
 
     def _heed(self, news: News, now: Ns) -> None:
-        """A step has reached the trip position."""
+        """A step has reached the trip position; or a limit stops the motion, and a jog held meanwhile is spent."""
+        if news.limited:
+            self._spent |= {pin for pin in ("JOG1", "JOG2") if self._ports.active(pin)}
         if news.tripped and (vector := self._trip.reached(now)):
             self._running.trip(vector, now)
 
@@ -548,6 +549,7 @@ class Dcb274:
             return
         stopped = self._ports.stopped
         if stopped and not self._stopped:
+            self._inbox.clear()  # what was typed ahead is pending, too
             self._soft_stop(now)
         self._stopped = stopped
         self._running.poll(now)

@@ -38,10 +38,14 @@ _INDEXING = (Course.INDEX, Course.SEEK_LOW, Course.SEEK_HIGH)
 
 
 class News(NamedTuple):
-    """What a deadline or an input brought: an action may be complete; a step has reached the trip position."""
+    """What a deadline or an input brought.
+
+    An action may be complete; a step has reached the trip position; a limit stops the motion.
+    """
 
     ended: bool = False
     tripped: bool = False
+    limited: bool = False
 
 
 NOTHING = News()
@@ -299,7 +303,7 @@ class Motion:
                 self.soft_stop(now)
             else:
                 self.halt(now)
-            return ENDED if self.at_rest else NOTHING
+            return News(self.at_rest, limited=True)
         if self._stopping:
             return NOTHING  # "after velocity deceleration, the process is terminated" (page 28): of F as well
         low = self._ports.active("HOME")
