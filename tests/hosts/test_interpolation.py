@@ -50,7 +50,7 @@ def check_bus(distances: Sequence[int], fastest: int) -> None:
     axes = len(order_of(distances))
     first = [run for place, run in enumerate(runs[:axes]) if run.at == place * MESSAGE]
     ends = {run.axis: run.end for run in first}
-    busy = len(first) * MESSAGE - BOOKED + EXCHANGE
+    busy = (len(first) - 1) * MESSAGE - BOOKED + EXCHANGE
     for run in runs[len(first) :]:
         assert run.at - EXCHANGE >= ends.get(run.axis, 0) + (LATE if run.axis in ends else 0)
         assert run.at >= busy + BOOKED
