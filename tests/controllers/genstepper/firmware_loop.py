@@ -24,6 +24,7 @@ class LoopMotor:
         self.next = None
         self.closed = {1: False, -1: False}  # the limits
         self.floor = (0, 0)  # slope and stop rate that a stop at a limit does not fall below
+        self.rested = -1  # the tick at or before which it came to rest; None in motion
         self.key = None  # what slew keys ask for: a direction, 0 for both at once
         self.steps: list[tuple[int, int]] = []
 
@@ -58,8 +59,10 @@ class LoopMotor:
         elif self.direction == direction:
             if self.closed[direction]:
                 self.begin_stop(None)
+            elif self.floor != (0, 0):
+                self.begin_stop(("slew", direction))
             else:
-                self.state, self.next, self.floor = "slew", None, (0, 0)
+                self.state, self.next = "slew", None
         else:
             self.begin_stop(("slew", direction))
 
@@ -93,8 +96,14 @@ class LoopMotor:
                 self.stop()
 
     def look_at_key(self):
-        if self.key and self.state == "idle" and not self.closed[self.key]:
+        """A key that is held slews again on the tick after the motor came to rest."""
+        if self.state != "idle":
+            self.rested = None
+        elif self.rested is None:
+            self.rested = self.ticks
+        elif self.key and self.ticks > self.rested and not self.closed[self.key]:
             self.begin_slew(self.key)
+            self.rested = None if self.state != "idle" else self.rested
 
     def begin_go(self):
         distance = self.target - self.position
@@ -123,7 +132,6 @@ class LoopMotor:
                 self.begin_go()
             elif then:
                 self.begin_slew(then[1])
-            self.look_at_key()
 
     # time
 
@@ -154,7 +162,6 @@ class LoopMotor:
             self.steps.append((self.zero + self.ticks * TICK, self.direction))
         if self.state == "go" and self.position == self.target:
             self.state = "idle"
-            self.look_at_key()
         elif self.state == "stop":
             self.maybe_stopped()
 
@@ -162,3 +169,4 @@ class LoopMotor:
         """All ticks up to and including `now`."""
         while self.zero + (self.ticks + 1) * TICK <= now:
             self.tick()
+            self.look_at_key()

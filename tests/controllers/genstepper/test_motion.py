@@ -39,6 +39,7 @@ def do(board: Board, loop: LoopMotor, letter: str, value: object) -> None:
     else:
         board.send(f"{value}{letter}")
         obey(loop, letter, value)
+    loop.look_at_key()
 
 
 def obey(loop: LoopMotor, letter: str, value: object) -> None:

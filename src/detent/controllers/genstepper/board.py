@@ -78,6 +78,8 @@ class Board:
         self._rate_place = FIRST_RATE
         self._keys = dict.fromkeys(AXES, Keys.NONE)  # as they were when last looked at
         self._unheeded: tuple[str, ...] = ()  # motors that were halted under a held key
+        self._rests_until: dict[str, Ns] = dict.fromkeys(AXES, now)  # the tick after it came to rest; NEVER in motion
+        self._again: Ns = NEVER  # when held keys are to be looked at again
         self._lost = ""  # what came while the board was deaf
         self._drives: dict[str, DriveSet] = {}  # what was last told of each connector
         self._wakes: Ns = NEVER
@@ -255,7 +257,7 @@ class Board:
     def _next(self) -> Ns:
         motors = self._motors
         return min(motors["X"].deadline, motors["Y"].deadline, self._direct.deadline, self._wakes,
-                   self._prompter.deadline)  # fmt: skip
+                   self._again, self._prompter.deadline)  # fmt: skip
 
     # -- resets ------------------------------------------------------------------------------------------
 
@@ -297,9 +299,10 @@ class Board:
     def _look_at_keys(self, now: Ns) -> None:
         """A key slews its motor as long as it is held and stops it when it is let go; both of a pair stop it (page 21).
 
-        What stops a motor under a held key (Z, =, a limit) brings it to rest; from there it slews again, as soon as
-        there is a way.
+        What stops a motor under a held key (Z, =, a limit) brings it to rest; on the next tick it slews again, as soon
+        as there is a way.
         """
+        self._again = NEVER
         if self._phase is not Phase.READY:
             return
         for axis, motor in self._motors.items():
@@ -311,10 +314,16 @@ class Board:
                     motor.slew(asked.value, now)
                 else:
                     motor.stop(now)
-            elif (
-                asked.value and motor.idle and axis not in self._unheeded and not self._limits.closed(axis, asked.value)
-            ):
+            if not motor.idle:
+                self._rests_until[axis] = NEVER
+            elif self._rests_until[axis] >= NEVER:
+                self._rests_until[axis] = motor.next_tick(now)
+            if not asked.value or not motor.idle or axis in self._unheeded or self._limits.closed(axis, asked.value):
+                continue
+            if self._rests_until[axis] <= now:
                 motor.slew(asked.value, now)
+            else:
+                self._again = min(self._again, self._rests_until[axis])
 
     def _held(self, axis: str) -> Keys:
         """The slew keys of an axis that are held; none where they are no slew keys (E mode, NOSLEW)."""

@@ -27,7 +27,7 @@ class Action(Enum):
     GOING = "going"  # towards a target: report -8 tells ramping up, at speed, slowing
     SLEWING = "slewing"
     STOPPING = "stopping"
-    REVERSING = "reversing"  # stops, then slews the other way
+    REVERSING = "reversing"  # stops, then slews: the other way, or on from a limit that has opened again
     TURNING = "turning"  # stops, then goes to a target
 
 
@@ -45,6 +45,7 @@ class Motor:
         "_go_run",
         "_limit_tick",
         "_limits",
+        "_onward",
         "_origin",
         "_plan",
         "_shut",
@@ -84,6 +85,7 @@ class Motor:
         self._ends_at: Ns = NEVER
         self._go_run = self._go_keep = self._braking_slope = 0  # as they were when G was given
         self._limit_tick = -1  # the tick before which a limit was seen
+        self._onward = 1  # where the slew behind a stop leads
         self._shut = False  # the limit ahead was closed when last looked at
         self._floor = (0, 0)  # slope and stop OK rate that a stop at a limit does not fall below
 
@@ -147,7 +149,7 @@ class Motor:
                 return 4
             case Action.STOPPING:
                 return 5
-            case Action.REVERSING:
+            case Action.REVERSING if self._onward != self.direction:
                 return 6
         return 7
 
@@ -171,16 +173,16 @@ class Motor:
         self.go(self.seen_target(now) + steps, now)
 
     def slew(self, direction: int, now: Ns) -> None:
-        """Go in a direction until stopped; not on towards a limit that is closed."""
+        """Go in a direction until stopped; not on towards a limit that is closed, and from a stop at one after that."""
         if self.action is Action.IDLE:
             self._start_slew(direction, self._tick(now), now)
-        elif direction != self.direction:
-            self._stop_for(Action.REVERSING, now)
-        elif self._limits.meets(self.name, direction):
+        elif direction == self.direction and self._limits.meets(self.name, direction):
             self._stop_for(Action.STOPPING, now)
-        else:
-            self._floor = (0, 0)
+        elif direction == self.direction and not self._at_limit:
             self._continue_slew(now)
+        else:
+            self._onward = direction
+            self._stop_for(Action.REVERSING, now)
 
     def stop(self, now: Ns) -> None:
         """Z: down the ramp to the stop OK rate."""
@@ -279,6 +281,10 @@ class Motor:
 
     # -- plans -------------------------------------------------------------------------------------------
 
+    def next_tick(self, now: Ns) -> Ns:
+        """When the tick after `now` is."""
+        return self._time_zero + (self._tick(now) + 1) * TICK
+
     def _tick(self, now: Ns) -> int:
         """The last tick up to and including `now`."""
         return (now - self._time_zero) // TICK
@@ -327,10 +333,15 @@ class Motor:
         speed = min(self.keep, self.rate) * UPDATES
         self._follow(Action.SLEWING, slewing(0, speed, self.rate, self.slope, room), tick, now)
 
+    @property
+    def _at_limit(self) -> bool:
+        """Whether a stop is under way because a limit was met."""
+        return self._floor != (0, 0)
+
     def _turn(self, direction: int) -> None:
         """From rest, in a direction."""
         self.direction = direction
-        self._shut, self._floor = False, (0, 0)
+        self._shut, self._floor, self._limit_tick = False, (0, 0), -1
 
     def _leads_on(self, now: Ns) -> bool:
         """Whether the target lies beyond the place at which the stop ends that begins at `now`."""
@@ -380,7 +391,7 @@ class Motor:
         if self.action is Action.TURNING:
             self._start_go(tick, now)
         elif self.action is Action.REVERSING:
-            self._start_slew(-self.direction, tick, now)
+            self._start_slew(self._onward, tick, now)
         else:
             self._rest()
         return self.action is Action.IDLE
