@@ -453,7 +453,7 @@ class Board:
             self._fresh_if_waiting(wall)
             return
         if is_config or is_shutdown:
-            self._start_again()
+            self._start_again(bool(is_shutdown))
             return
         self._fresh = True
         for name, values in commands:
@@ -466,14 +466,13 @@ class Board:
             self._wait_until = None
             self._read_all(wall)
 
-    def _start_again(self) -> None:
+    def _start_again(self, is_shutdown: bool) -> None:
         """It has another configuration: it has to start again, and its connection goes away."""
         core = self.core
         if "reset" in core.dictionary.commands:
             core.command("reset")
         elif "config_reset" in core.dictionary.commands:
-            core.command("emergency_stop")
-            core.command("config_reset")
+            core.command("config_reset" if is_shutdown else "emergency_stop")  # see `_shutdown`
         else:
             self._refuse("", "", "it has another configuration and cannot be reset by command; switch it off and on")
             return
@@ -623,6 +622,9 @@ class Board:
     def _shutdown(self, message: Message, wall: WallNs) -> None:
         reason = self.core.dictionary.reason(message.number("static_string_id"))
         if self.wants_reopening:
+            # what follows a shutdown in its block is not carried out: the reset is asked for now
+            if message.name == "shutdown" and "reset" not in self.core.dictionary.commands:
+                self.core.command("config_reset")
             return
         if self.state is State.CONFIGURING and not self._recovering:
             self._refuse("", "", f"the firmware does not take this configuration: {reason}")

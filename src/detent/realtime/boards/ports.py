@@ -1,6 +1,7 @@
 """Where bytes of a board come from: a serial device, or a fake board in this process."""
 
 import os
+import select
 import termios
 import tty
 from collections.abc import Sequence
@@ -81,8 +82,8 @@ class SerialPort:
             return b""
         except OSError as error:
             raise self._lost(error.strerror) from error
-        if not data and not Path(self._device).exists():
-            raise self._lost("it was unplugged")
+        if not data and self._hung_up():
+            raise self._lost("it was unplugged, or has started again")
         return data
 
     def send(self, data: bytes, wall: WallNs) -> None:
@@ -124,6 +125,12 @@ class SerialPort:
             port.close()  # type: ignore[attr-defined]
         elif descriptor >= 0:
             os.close(descriptor)
+
+    def _hung_up(self) -> bool:
+        """Whether nothing to read means its end: a terminal without data says the same."""
+        poll = select.poll()
+        poll.register(self._descriptor, 0)
+        return any(event & (select.POLLHUP | select.POLLERR | select.POLLNVAL) for _, event in poll.poll(0))
 
     def _lost(self, reason: str | None) -> PortLost:
         self.close()

@@ -44,9 +44,9 @@ class _Channel:
         self.forget()
 
     def forget(self) -> None:
-        """It has stopped, or is new: it wants a clock, and its direction is 0."""
+        """It has stopped, or is new, or was left by somebody: it wants a clock and a direction."""
         self.last: int | None = None  # the tick of the last step sent
-        self.up = False
+        self.up: bool | None = None
 
 
 class Stepper:
@@ -145,6 +145,10 @@ class Stepper:
             span = self._spans[-1]
             span.last = max(last, span.next - 1)
             self._told = span.shaft + span.direction * span.last
+            if span.next > span.last:  # all of it has left
+                self._spans.pop()
+                if not self._spans:
+                    self._runs = None
 
     def _rested(self, train: Train) -> None:
         """A motion begins: the lag of the one before is over if there was time enough between."""

@@ -149,10 +149,12 @@ class FakeBoard:
             if self.kept_log:
                 self.log.append((self.now, message.name, message.values))
             if method is not None:
-                self._guarded(partial(method, **message.values))
+                shut = self._guarded(partial(method, **message.values))
             else:
                 part = self.oids.get(int(message.values["oid"]))
-                self._guarded(partial(self._of_part, part, message))
+                shut = self._guarded(partial(self._of_part, part, message))
+            if shut:
+                return  # the rest of the block is not carried out
 
     def _of_part(self, part: Any, message: Any) -> None:
         name = message.name
@@ -170,11 +172,14 @@ class FakeBoard:
 
     # -- shutdown
 
-    def _guarded(self, what: Callable[[], None]) -> None:
+    def _guarded(self, what: Callable[[], None]) -> bool:
+        """Whether it ended in a shutdown."""
         try:
             what()
         except Shutdown as shutdown:
             self.shut_down(str(shutdown))
+            return True
+        return False
 
     def shut_down(self, reason: str) -> None:
         """Stop everything; nothing but a few commands is carried out until it is cleared."""

@@ -1,0 +1,366 @@
+"""The stock firmware itself, where there is one: what it does is what the fake board does.
+
+`DETENT_FIRMWARE_PTY` is the terminal of a running firmware (its Linux process, or a board that may move nothing).
+`DETENT_FIRMWARE_MACHINE` is the shared memory of a stand-in for its GPIO device which counts steps and moves switches:
+64-bit number of records and room for them, 512 levels of inputs, 512 of outputs, 16 axes (int32 step, dir, inverted,
+used, int64 position), 32 switches (int32 used, axis, line, level inside, int64 lowest, highest), then the records
+(uint64 ns, uint16 line, uint16 level, int32 position). Position 15 of the axes is by how much its clock lags behind
+the host's.
+"""
+
+import mmap
+import os
+import select
+import struct
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+
+from detent.axis import Axis, MotionStarted
+from detent.pulses import Train
+from detent.ramps import constant_acceleration
+from detent.realtime.boards.events import CountDiffers, InputChanged, Ready, Recovered, Refusal, ShutDown, Stopped
+from detent.realtime.boards.ports import Look, open_port
+from detent.realtime.boards.setup import BoardSetup, InputSetup, OutSetup, Pin, StepperSetup
+from detent.realtime.boards.several import Boards
+from detent.ticks import MS, SECOND, US, Ns, to_fixed
+
+TERMINAL = os.environ.get("DETENT_FIRMWARE_PTY", "")
+MACHINE = os.environ.get("DETENT_FIRMWARE_MACHINE", "")
+
+pytestmark = pytest.mark.skipif(not TERMINAL, reason="DETENT_FIRMWARE_PTY does not name the terminal of a firmware")
+with_machine = pytest.mark.skipif(not MACHINE, reason="DETENT_FIRMWARE_MACHINE does not name a machine behind its pins")
+
+E = TypeVar("E")
+
+INPUTS, AXES, SWITCHES, RECORDS = 16, 16 + 1024, 16 + 1024 + 16 * 24, 16 + 1024 + 16 * 24 + 32 * 32
+STEP, DIR, MOV, ENABLE, EOT, HOME = 2, 3, 6, 4, 10, 11
+
+
+class Machine:
+    """The machine behind the pins; none: nothing is known but what the firmware says."""
+
+    def __init__(self, path: str) -> None:
+        self._memory: mmap.mmap | None = None
+        if path:
+            with Path(path).open("r+b") as file:
+                self._memory = mmap.mmap(file.fileno(), 0)
+            memory = self._memory
+            memory[INPUTS : INPUTS + 512] = bytes([1]) * 512
+            struct.pack_into("<iiiiq", memory, AXES, STEP, DIR, 0, 1, self.position)
+            memory[SWITCHES : SWITCHES + 32 * 32] = bytes(32 * 32)
+
+    @property
+    def position(self) -> int:
+        assert self._memory is not None
+        return int(struct.unpack_from("<q", self._memory, AXES + 16)[0])
+
+    def switch(self, line: int, low: int, high: int) -> None:
+        """An input that is low between two positions, high elsewhere."""
+        assert self._memory is not None
+        struct.pack_into("<iiiiqq", self._memory, SWITCHES, 1, 0, line, 0, low, high)
+        self.put(line, not low <= self.position <= high)
+
+    def put(self, line: int, level: bool) -> None:
+        assert self._memory is not None
+        self._memory[INPUTS + line] = int(level)
+
+    def output(self, line: int) -> bool:
+        assert self._memory is not None
+        return bool(self._memory[INPUTS + 512 + line])
+
+    def records(self) -> list[tuple[int, int, int, int]]:
+        """(ns, line, level, position) so far."""
+        assert self._memory is not None
+        count = struct.unpack_from("<Q", self._memory, 0)[0]
+        return [struct.unpack_from("<QHHi", self._memory, RECORDS + 16 * i) for i in range(count)]
+
+    def wall(self) -> Ns:
+        """The clock that the firmware keeps."""
+        now = time.monotonic_ns()
+        return (
+            now if self._memory is None else now - int(struct.unpack_from("<q", self._memory, AXES + 15 * 24 + 16)[0])
+        )
+
+
+class Host:
+    """A host with one axis, in real time."""
+
+    def __init__(self, machine: Machine, setup: BoardSetup) -> None:
+        self.machine, self.events, self.aligned, self.now = machine, [], False, 0  # type: ignore[var-annotated]
+        self.boards = Boards([(setup, open_port(TERMINAL))])
+        self.told: list[object] = []
+        self.axis = Axis(self.told)  # type: ignore[arg-type]
+        self.busy: Ns = 0
+
+    @property
+    def stepper(self) -> object:
+        return self.boards.steppers["slide"]
+
+    def begin(self) -> "Host":
+        self.boards.start(self.machine.wall())
+        self.until(lambda: self.boards.ready)
+        self.boards.steppers["slide"].adopt(self.axis.shaft)
+        self.boards.align(self.now, self.boards.ns_at(self.machine.wall()))
+        self.aligned = True
+        return self
+
+    def turn(self) -> None:
+        boards = self.boards
+        readable, writable, _ = select.select(boards.reading(), boards.writing(), (), 0.0005)
+        began = time.thread_time_ns()
+        wall = self.machine.wall()
+        for descriptor in readable:
+            boards.receive(descriptor, wall)
+        for descriptor in writable:
+            boards.flush(descriptor, wall)
+        boards.due(wall)
+        self.events += boards.events()
+        if self.aligned:
+            wall = self.machine.wall()
+            self.now = max(self.now, boards.cell_at(wall))
+            while self.axis.deadline <= self.now:
+                self.axis.advance(self.axis.deadline)
+            for entry in self.told:
+                boards.steppers["slide"].tell(entry)  # type: ignore[arg-type]
+            self.told.clear()
+            at = boards.commit_at()
+            if at is not None and at <= wall:
+                boards.commit(self.now, wall)
+            self.events += boards.events()
+        self.busy += time.thread_time_ns() - began
+
+    def until(self, done: Callable[[], bool], most: float = 20.0) -> None:
+        end = time.monotonic() + most
+        while not done():
+            assert time.monotonic() < end, self.events
+            assert not self.of(Refusal), self.events
+            self.turn()
+
+    def run(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.turn()
+
+    def of(self, kind: type[E]) -> list[E]:
+        return [event for event in self.events if isinstance(event, kind)]
+
+    def move(self, train: Train, direction: int) -> None:
+        marks = () if train.steps is None else (train.steps,)
+        self.axis.start(train.shifted(to_fixed(self.now)), direction, marks, self.now)
+
+    def rest(self) -> None:
+        self.until(lambda: not self.axis.moving, 120)
+        self.run(0.2)
+
+    def stop_at(self, stop: Stopped, started: MotionStarted) -> None:
+        """Take the axis back to the stop."""
+        assert started.train.steps_by(stop.at) == (stop.shaft - started.shaft) * started.direction
+        self.axis.cut(stop.at)
+        self.told.clear()
+        self.boards.steppers["slide"].rewind(stop.shaft)
+        assert self.axis.shaft == stop.shaft
+
+
+def setup(watchdog: Ns = 2 * SECOND, pulse: Ns = 5 * US) -> BoardSetup:
+    return BoardSetup(
+        "left",
+        steppers=(StepperSetup("slide", Pin(f"gpio{STEP}"), Pin(f"gpio{DIR}"), pulse),),
+        outs=(OutSetup("MOV", Pin(f"gpio{MOV}")), OutSetup("ENABLE", Pin(f"gpio{ENABLE}", True), watchdog=watchdog)),
+        inputs=(InputSetup("EOT", Pin(f"gpio{EOT}", pull=1)), InputSetup("HOME", Pin(f"gpio{HOME}"))),
+    )
+
+
+@pytest.fixture
+def host() -> Iterator[Host]:
+    machine = Machine(MACHINE)
+    made = Host(machine, setup())
+    if MACHINE:
+        made.axis.shaft = machine.position
+    yield made.begin()
+    made.boards.close()
+
+
+def test_it_says_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    look = Look(open_port(TERMINAL))
+    look.start(time.monotonic_ns())
+    end = time.monotonic() + 10
+    while not look.turn(time.monotonic_ns()):
+        assert time.monotonic() < end
+        select.select(look.port.reading(), (), (), 0.01)
+    look.port.close()
+    assert look.found is not None
+    assert look.found.missing == ()
+    with capsys.disabled():
+        print(f"\nchecked against {look.found.firmware} on {look.found.mcu} at {look.found.frequency} Hz")
+
+
+def test_moves_are_counted_as_they_are_told(host: Host) -> None:
+    begin = host.axis.shaft
+    for direction, steps in ((1, 1000), (-1, 400), (1, 3), (-1, 1)):
+        host.move(constant_acceleration.move(200, 1500, 60, steps).train, direction)
+        host.rest()
+        assert host.boards.steppers["slide"].counted() == host.axis.shaft
+        if MACHINE:
+            assert host.machine.position == host.axis.shaft
+    assert host.axis.shaft == begin + 602
+    assert not host.of(CountDiffers)
+
+
+def test_cuts_in_mid_move(host: Host) -> None:
+    for n in range(12):
+        host.move(constant_acceleration.move(100, 3000, 200, None).train, 1 - n % 2 * 2)
+        host.run(0.05 + 0.03 * n)
+        host.axis.cut(host.now)
+        host.rest()
+        assert host.boards.steppers["slide"].counted() == host.axis.shaft
+        if MACHINE:
+            assert host.machine.position == host.axis.shaft
+    assert not host.of(CountDiffers)
+
+
+def test_a_hundred_thousand_steps_at_10_khz(host: Host, capsys: pytest.CaptureFixture[str]) -> None:
+    host.busy = 0
+    began = time.monotonic()
+    host.move(constant_acceleration.move(1000, 10_000, 1000, 100_000).train, 1)
+    host.rest()
+    share = host.busy / 1e9 / (time.monotonic() - began)
+    assert host.boards.steppers["slide"].counted() == host.axis.shaft
+    if MACHINE:
+        assert host.machine.position == host.axis.shaft
+    with capsys.disabled():
+        print(f"\n10 kHz: {100 * share:.0f} % of a core, {host.boards.master.statistics()}")
+
+
+@with_machine
+def test_homings_stop_on_the_step(host: Host) -> None:
+    machine = host.machine
+    for n in range(50):
+        rate = (200, 1000, 2000)[n % 3]
+        edge = machine.position + 40 + 7 * n
+        machine.switch(EOT, edge, 1 << 40)
+        host.run(0.01)
+        host.boards.stops["slide"].arm({"EOT": False}, host.now)
+        host.move(constant_acceleration.move(rate, rate, 1, None).train, 1)
+        [started] = host.told
+        assert isinstance(started, MotionStarted)
+        before = len(host.of(Stopped))
+        host.until(lambda before=before: len(host.of(Stopped)) > before)
+        stop = host.of(Stopped)[-1]
+        assert stop.shaft == machine.position == edge
+        host.stop_at(stop, started)
+        host.run(0.05)
+        assert machine.position == edge
+        host.boards.stops["slide"].disarm()
+        host.move(constant_acceleration.move(1000, 1000, 1, 30 + 7 * n).train, -1)
+        host.rest()
+        assert host.boards.steppers["slide"].counted() == host.axis.shaft == machine.position
+    assert not host.of(CountDiffers)
+
+
+@with_machine
+def test_outputs_change_with_the_steps_and_inputs_are_told(host: Host) -> None:
+    machine = host.machine
+    host.boards.outs["MOV"].set(True, host.now)
+    host.run(0.1)
+    assert machine.output(MOV)
+    host.boards.outs["MOV"].set(False, host.now)
+    host.run(0.1)
+    assert not machine.output(MOV)
+    machine.put(HOME, False)
+    host.run(0.05)
+    machine.put(HOME, True)
+    host.run(0.05)
+    assert [(e.input, e.level) for e in host.of(InputChanged)] == [("HOME", False), ("HOME", True)]
+
+
+def test_an_emergency_stop_in_a_move_and_on_from_there(host: Host) -> None:
+    host.boards.outs["ENABLE"].set(True, host.now)
+    host.move(constant_acceleration.move(1000, 1000, 1, None).train, 1)
+    host.run(0.3)
+    host.boards.emergency_stop(host.machine.wall())
+    host.until(lambda: bool(host.of(ShutDown)))
+    host.run(0.1)
+    if MACHINE:
+        assert host.machine.output(ENABLE)  # active low: off
+    host.boards.recover(host.machine.wall())
+    host.until(lambda: bool(host.of(Recovered)))
+    shaft = host.of(Recovered)[0].shafts["slide"]
+    assert shaft is not None
+    if MACHINE:
+        assert shaft == host.machine.position
+    host.axis.cut(host.now)
+    host.told.clear()
+    host.axis.shaft = shaft
+    host.boards.steppers["slide"].rewind(shaft)
+    host.move(constant_acceleration.move(200, 1500, 60, 300).train, -1)
+    host.rest()
+    assert host.boards.steppers["slide"].counted() == host.axis.shaft == shaft - 300
+    assert not host.of(CountDiffers)
+
+
+def test_a_host_that_is_gone_leaves_its_position(host: Host) -> None:
+    """Another host finds the board as this one left it in mid-move: configured, still, and its count kept."""
+    host.move(constant_acceleration.move(1000, 1000, 1, None).train, 1)
+    host.run(0.3)
+    host.boards.close()
+    time.sleep(0.2)
+    after = Host(host.machine, setup()).begin()
+    [ready] = after.of(Ready)
+    assert not ready.restarted
+    if MACHINE:
+        after.axis.shaft = host.machine.position
+        after.boards.steppers["slide"].adopt(after.axis.shaft)
+    after.move(constant_acceleration.move(200, 1500, 60, 200).train, -1)
+    after.rest()
+    assert after.boards.steppers["slide"].counted() == after.axis.shaft
+    if MACHINE:
+        assert host.machine.position == after.axis.shaft
+    after.boards.close()
+
+
+def test_an_output_that_nobody_refreshes_falls(host: Host) -> None:
+    host.boards.outs["ENABLE"].set(True, host.now)
+    host.run(0.2)
+    if MACHINE:
+        assert not host.machine.output(ENABLE)
+    host.boards.close()
+    time.sleep(2.5)
+    if MACHINE:
+        assert host.machine.output(ENABLE)
+    after = Host(host.machine, setup()).begin()  # which clears the shutdown
+    assert not after.of(Ready)[0].restarted
+    after.boards.close()
+
+
+def test_another_configuration_starts_it_again() -> None:
+    machine = Machine(MACHINE)
+    made = Host(machine, setup(pulse=7 * US)).begin()
+    assert made.of(Ready)[0].restarted
+    made.move(constant_acceleration.move(200, 1500, 60, 200).train, 1)
+    made.rest()
+    assert made.boards.steppers["slide"].counted() == made.axis.shaft == 200
+    made.boards.close()
+
+
+def test_step_edges_are_where_they_were_sent() -> None:
+    """Lateness of edges in the process is the operating system's; the middle one is on time, to some us."""
+    if not MACHINE:
+        pytest.skip("DETENT_FIRMWARE_MACHINE does not name a machine behind its pins")
+    machine = Machine(MACHINE)
+    made = Host(machine, setup()).begin()
+    before = len(machine.records())
+    made.turn()  # that took a while
+    made.move(constant_acceleration.move(500, 500, 1, 500).train, 1)
+    [started] = made.told
+    assert isinstance(started, MotionStarted)
+    made.rest()
+    edges = [ns for ns, line, level, _ in machine.records()[before:] if line == STEP and level]
+    assert len(edges) == 500
+    due = [made.boards.wall_of(started.train.time_of(n) + made.boards.lead) for n in range(1, 501)]
+    late = sorted(edge - at for edge, at in zip(edges, due, strict=True))
+    assert abs(late[250]) < 1 * MS
+    made.boards.close()
