@@ -299,3 +299,35 @@ def test_a_wrong_motor_is_told_with_key_and_remedy(old: str, new: str, said: str
     with pytest.raises(Problem) as caught:
         cell(AXIS.format(more="").replace(old, new))
     assert said in str(caught.value)
+
+
+class TestWhatHangsOnIt:
+    BELT = "mechanics = { belt = 8e-3, mass = 0.2, friction = 0.02 }\nload_by = { turns = [[0, 0.0], [1, 0.1]] }\n"
+    CELL = '[units.axis]\nmodel = "gs-c200"\n[motors.slide]\nmotor = "qsh4218-41-10-035"\nunit = "axis"\nsupply = 24\n'
+
+    def test_mechanics_drive_wiring_and_a_load_that_changes(self) -> None:
+        rig = motor(cell(self.CELL + 'drive = "a4988"\n' + self.BELT)).rig
+        assert rig.load.inertia == pytest.approx(1.28e-5)
+        assert rig.load.friction == 0.02
+        assert rig.load.torque_by_position.at(3.14159265) == pytest.approx(0.05)
+        assert (rig.drive.decay, rig.drive.resistance) == ("mixed", 0.64)
+        assert rig.damping is not None
+        assert rig.damping.ratio == 0.12
+        own = self.CELL.replace("qsh4218-41-10-035", "23-305-ds8a-series").replace("= 24", "= 40")
+        wired = motor(cell(own + 'wiring = "parallel"\ndata = { inertia = 4.8e-5 }\ndamping = 0.2\n')).rig
+        assert wired.motor.resistance == pytest.approx(0.7)
+        assert wired.damping is not None
+        assert wired.damping.source == "from the cell file"
+
+    @pytest.mark.parametrize(
+        ("more", "words"),
+        [('drive = "a4999"', "did you mean a4988"), ('drive = "a4988"\ndecay = "slow"', "a decay of its own"),
+         ("mechanics = { mas = 1 }", "did you mean mass"), ("mechanics = { mass = 1 }", "needs what moves it"),
+         ("load_by = { m = [[0, 0], [1, 1]] }", "m needs what moves"), ("load_by = { s = [[0, 0.0]] }", "two points"),
+         ("load_by = { m = [[0, 0], [1, 1]], turns = [[0, 0], [1, 1]] }", "give one of them"),
+         ('wiring = "series"', "do not say how"), ("damping = 7", "ratio is 7")],
+    )  # fmt: skip
+    def test_what_cannot_be_is_refused_with_its_motor(self, more: str, words: str) -> None:
+        with pytest.raises(Problem, match=words) as caught:
+            cell(self.CELL + more + "\n")
+        assert str(caught.value).startswith("cell.toml: motors.slide")

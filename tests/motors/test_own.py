@@ -221,7 +221,17 @@ class TestDrives:
         assert Drive(24, 1.0, decay="mixed", fast_part=1.0).fall == -1.0
 
     def test_a_makers_accuracy_is_carried_and_bounded(self) -> None:
-        assert LARGE.changed(accuracy=0.05).accuracy == 0.05
+        """Microsteps are off by up to that between full steps, full steps are not; the rotor stands where they say."""
+        off = LARGE.changed(accuracy=0.05)
+        errors = {}
+        for count in (
+            4,
+            8,
+        ):  # an eighth of a step further: between two full steps, where the error is greatest, and on one
+            rig = Rig(off, Drive(24, 1.0, microstep(16)), Load(LARGE.rotor))
+            errors[count] = simulate(even(400, count + 8), rig, settle=200 * MS).verdict.error
+        assert abs(errors[4]) == pytest.approx(0.05, abs=0.005)
+        assert abs(errors[8]) < 0.005
         with pytest.raises(MotorError, match="accuracy"):
             LARGE.changed(accuracy=0.5)
 

@@ -124,13 +124,17 @@ class Motor(_Table):
     current: float | Current | None = None  # A in each phase with both on; the motor's rating
     step: str = "half"
     decay: Literal["fast", "slow", "mixed", "auto", "voltage"] = "fast"
+    drive: str = ""  # by name (tmc2209, a4988, ...): its decay, its switches, whether it interpolates
     threshold: float = 0.0  # full steps/s from which on decay is fast (auto)
     drop: float = 0.0  # V in the switches
     resistance: float = 0.0  # ohm of switches and wires
     fitted: bool = False  # to the maker's torque curve
+    wiring: Literal["", "series", "parallel", "unipolar"] = ""  # of a motor that is sold for several; as it is named
     damping: Number | None = None  # ratio of the bare rotor; None: the motor's own, or what is usual with the drive
     data: dict[str, Steps | Number | str] = {}  # an own motor, or what is different in the named one: SI units
     load: dict[Literal["inertia", "friction", "viscous", "torque"], Annotated[float, Field(ge=-1e6, le=1e6)]] = {}
+    mechanics: dict[str, Number] = {}  # screw, belt, rack, gear, mass, ...: what `detent.motors.mechanics` takes
+    load_by: dict[Literal["s", "turns", "m"], Annotated[list[tuple[Number, Number]], Field(max_length=100_000)]] = {}
     lead: Number | None = None  # distance a step: then places of switches are distances
     reverse: bool = False  # plus turns the motor the other way
     window: float = Field(0.5, gt=0, le=4)  # steps that the step detector takes for made

@@ -1,9 +1,9 @@
 """Motors fitted to a cell: from ``[motors.NAME]`` and the switches on its axis to a `Mechanics`."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, replace
 from difflib import get_close_matches
-from math import inf
+from math import inf, pi
 from typing import Any
 
 from detent.cell.contacts import PINS, Contact, Detector
@@ -11,8 +11,10 @@ from detent.cell.description import Current, Description, Motor, Problem, Switch
 from detent.cell.mechanics import Mechanics
 from detent.motors.damping import Damping, given
 from detent.motors.drive import Currents, Drive
+from detent.motors.drives import drive as by_name
 from detent.motors.fit import fitted
-from detent.motors.load import Load
+from detent.motors.load import Load, profile
+from detent.motors.mechanics import Mechanics as Mechanics_
 from detent.motors.motor import Motor as Rated
 from detent.motors.motor import MotorError
 from detent.motors.named import motor as named
@@ -71,8 +73,13 @@ def mechanics(
 def rated(name: str, entry: Motor) -> Rated:
     """The motor that an entry ``[motors.NAME]`` means: the named one, with its own numbers, or all of its own.
 
-    Raises MotorError.
+    Its windings are connected as the entry says. Raises MotorError.
     """
+    found = _as_sold(name, entry)
+    return found.wired(entry.wiring) if entry.wiring else found
+
+
+def _as_sold(name: str, entry: Motor) -> Rated:
     known = {field.name: field for field in fields(Rated) if field.name not in ("name", "title", "source")}
     given: dict[str, Any] = {}
     for key, value in entry.data.items():
@@ -144,7 +151,7 @@ def check_names(description: Description, taken: Sequence[str]) -> None:
 
 def _rig(name: str, entry: Motor, sequences: tuple[Winding, ...]) -> Rig:
     found = rated(name, entry)
-    load = Load(**{str(name): value for name, value in entry.load.items()})  # type: ignore[arg-type]
+    load = load_of(entry)
     current = entry.current
     if isinstance(current, (int, float)):
         amps, currents = float(current), Currents()
@@ -158,8 +165,47 @@ def _rig(name: str, entry: Motor, sequences: tuple[Winding, ...]) -> Rig:
             currents = Currents(current.ramp / amps, current.slew / amps, current.rest / amps)
     if sequences:
         return _commanded(entry, found, load, sequences, amps)
-    return Rig(found, Drive(entry.supply, amps, winding(entry.step), entry.decay, entry.threshold, currents, entry.drop,
-                            entry.resistance), load, damping=_damping(entry))  # fmt: skip
+    return Rig(found, _drive(entry, amps, currents), load, damping=_damping(entry))
+
+
+def _drive(entry: Motor, amps: float, currents: Currents) -> Drive:
+    if not entry.drive:
+        return Drive(entry.supply, amps, winding(entry.step), entry.decay, entry.threshold, currents, entry.drop,
+                     entry.resistance)  # fmt: skip
+    given_too = {"decay", "threshold"} & entry.model_fields_set
+    if given_too:
+        raise MotorError(f"drive: {entry.drive} has a decay of its own: leave out {' and '.join(sorted(given_too))}")
+    made = by_name(entry.drive, entry.supply, amps, winding(entry.step), currents=currents, drop=entry.drop)
+    return replace(made, resistance=made.resistance + entry.resistance)
+
+
+def load_of(entry: Motor) -> Load:
+    """What the shaft of an entry ``[motors.NAME]`` feels: its load, its mechanics, and what changes on the way.
+
+    Raises MotorError.
+    """
+    load = Load(**{str(name): value for name, value in entry.load.items()})  # type: ignore[arg-type]
+    known = {field.name for field in fields(Mechanics_)}
+    for key in entry.mechanics:
+        if key not in known:
+            near = get_close_matches(key, known, 1, 0.5)
+            hint = f"did you mean {near[0]}? " if near else ""
+            raise MotorError(f"mechanics: there is no {key!r}; {hint}there are: {', '.join(sorted(known))}")
+    mechanics = Mechanics_(**entry.mechanics)
+    felt = mechanics.load()
+    load = Load(load.inertia + felt.inertia, load.friction + felt.friction, load.viscous + felt.viscous,
+                load.torque + felt.torque)  # fmt: skip
+    if len(entry.load_by) > len({unit == "s" for unit in entry.load_by}):
+        raise MotorError("load_by: a load changes with turns or with m: give one of them")
+    for unit, points in entry.load_by.items():
+        if unit == "s":
+            load = replace(load, torque_by_time=profile(points))
+            continue
+        if unit == "m" and mechanics.travel is None:
+            raise MotorError("load_by: m needs what moves along a line: give mechanics with screw, belt or rack")
+        radians = 2 * pi / (mechanics.travel or 1.0 if unit == "m" else 1.0)
+        load = replace(load, torque_by_position=profile([(place * radians, torque) for place, torque in points]))
+    return load
 
 
 def _commanded(entry: Motor, found: Rated, load: Load, sequences: tuple[Winding, ...], amps: float) -> Rig:
@@ -167,6 +213,8 @@ def _commanded(entry: Motor, found: Rated, load: Load, sequences: tuple[Winding,
 
     A DCB-274 commands amperes. The boards have no feedback: full power is the supply (BS0610 manual, page 64).
     """
+    if entry.drive:
+        raise MotorError("drive: this controller has a power stage of its own: leave the key out")
     finest = max(sequences, key=lambda table: len({*zip(table.a, table.b, strict=True)}))
     decay = entry.decay
     given = entry.model_fields_set

@@ -428,7 +428,7 @@ def _judge(
 def _line(verdict: "Verdict", rig: "Rig") -> str:
     words = f"{verdict}; {verdict.where_it_rests}"
     if rig.motor.accuracy:
-        words += f" (and within {rig.motor.accuracy:g} of a step of what its maker promises)"
+        words += f" (its maker lets microsteps be {rig.motor.accuracy:g} of a step off: that is in it)"
     return words
 
 

@@ -67,7 +67,7 @@ class Motor(Shared):
     inductance_factor: float = 1.0
     viscous: float = 0.0  # Nm s/rad
     damping: float | None = None  # ratio of the bare rotor, measured; None: nobody knows
-    accuracy: float = 0.0  # of a step's place, as a part of a full step; it does not add up
+    accuracy: float = 0.0  # how far microsteps may be from their places, as a part of a full step; it does not add up
     wiring: str = ""  # series, parallel or unipolar, of a motor that can be wired otherwise
     title: str = field(default="", compare=False)
     source: str = field(default="", compare=False)

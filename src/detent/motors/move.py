@@ -65,6 +65,8 @@ class Verdict(NamedTuple):
         """Where the rotor is in the end, in words."""
         if not self.resting:
             return f"still swings by {self.swing:.2g} full steps either way"
+        if abs(self.error) < 0.005:
+            return "rests where it shall"
         side = "behind" if self.error >= 0 else "ahead"
         return f"rests {abs(self.error):.2f} full steps {side}"
 

@@ -88,8 +88,9 @@ class Rig(Shared):
         if load.is_steady:
             par[kernel.TL] = load.at_rest()
         set_(self, "parameters", par)
-        set_(self, "table_a", np.array([table.a for table in self.sequences or (winding,)]))
-        set_(self, "table_b", np.array([table.b for table in self.sequences or (winding,)]))
+        tables = [table.inaccurate(motor.accuracy) for table in self.sequences or (winding,)]
+        set_(self, "table_a", np.array([table.a for table in tables]))
+        set_(self, "table_b", np.array([table.b for table in tables]))
         set_(self, "by_time", np.array(load.torque_by_time.values))
         set_(self, "by_position", np.array(load.torque_by_position.values))
 

@@ -7,7 +7,7 @@ where the rotor of an ideal motor stands.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, floor, pi, sin, sqrt
+from math import atan2, cos, floor, hypot, pi, sin, sqrt
 
 from detent.motors.motor import MotorError, Shared
 
@@ -35,6 +35,21 @@ class Winding(Shared):
     def angle(self, place: int) -> float:
         """The electrical angle that place (of any turn) asks for."""
         return self.offset + place * self.pitch
+
+    def inaccurate(self, part: float) -> "Winding":
+        """The same sequence with its field off by up to `part` of a full step between the full steps, and not at them.
+
+        That is how far a maker lets a motor's microsteps be from their places: one error a full step, as a sine.
+        """
+        if part == 0 or self.steps < 4:
+            return self
+        a, b = [], []
+        for x, y in zip(self.a, self.b, strict=True):
+            length, angle = hypot(x, y), atan2(y, x)
+            angle += part * pi / 2 * sin(4 * angle)
+            a.append(length * cos(angle))
+            b.append(length * sin(angle))
+        return Winding(self.name, self.steps, tuple(a), tuple(b), self.offset)
 
     def on_grid(self, steps: int) -> "Winding":
         """The same sequence counted `steps` places to a full step: it moves on only where it has a place."""

@@ -3,18 +3,23 @@
 Nothing here waits or draws.
 """
 
+from dataclasses import replace
 from math import pi
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from detent.motors import engine
 from detent.motors.curve import PullOut, pull_out
-from detent.motors.drive import Drive
-from detent.motors.load import Load
+from detent.motors.damping import given, usual
+from detent.motors.diagnosis import Loss, diagnose
+from detent.motors.drive import Decay, Drive
+from detent.motors.load import NO_LOAD, Load
 from detent.motors.motor import Motor, MotorError
 from detent.motors.move import Verdict, simulate
 from detent.motors.rotor import Rig
+from detent.motors.variants import LossRate, loss_rate
 from detent.motors.winding import Winding
 from detent.pulses import Train
 from detent.ticks import Ns
@@ -24,6 +29,8 @@ Floats = npt.NDArray[np.float64]
 COLUMNS: Final = 480  # points of a picture across
 MOST_PULSES: Final = 2_000_000  # of a move that is judged while somebody waits
 MOST_TIME: Final[Ns] = 120_000_000_000  # likewise
+MOST_VARIED: Final[Ns] = 15_000_000_000  # of a move that is judged with variants, likewise
+VARIANTS: Final = 256
 _CURVE: Final = 14  # speeds of a torque curve
 _EDGE: Final = 24  # looks close to each end of a segment, where laws meet
 
@@ -86,14 +93,45 @@ class Demand(NamedTuple):
     torques: Floats
 
 
-def rig(motor: Motor, winding: Winding, *, supply: float, current: float, inertia: float, friction: float) -> Rig:
-    """Motor, drive and load: V, A a phase, kg m2 of the load, Nm. MotorError where they do not go together."""
+def rig(
+    motor: Motor, winding: Winding, *, supply: float, current: float, inertia: float, friction: float,
+    damping: float | None = None, rest: Load = NO_LOAD, decay: Decay = "fast",
+) -> Rig:  # fmt: skip
+    """Motor, drive and load: V, A a phase, kg m2 of the load, Nm. MotorError where they do not go together.
+
+    `rest` is what else hangs on the shaft: its inertia and friction do not count.
+    """
     if motor.inertia is None:
         # with the load's inertia as the whole; the maker gives no rotor
         if inertia <= 0:
             raise MotorError(f"the maker of {motor.name} gives no rotor inertia: give one for rotor and load together")
         motor, inertia = motor.changed(inertia=inertia), 0.0
-    return Rig(motor, Drive(supply, current, winding), Load(inertia, friction))
+    load = replace(rest, inertia=inertia, friction=friction)
+    ratio = None if damping is None or damping == usual(decay).ratio else given(damping)
+    return Rig(motor, Drive(supply, current, winding, decay), load, damping=ratio)
+
+
+class Judgement(NamedTuple):
+    """The verdict, where steps are lost, and how often variants lose them (None: too many to be waited for)."""
+
+    verdict: Verdict
+    loss: Loss | None
+    rate: LossRate | None
+
+    def words(self, rig: Rig) -> str:
+        """All of it in a sentence or two."""
+        verdict = self.verdict
+        said = f"Steps {self.loss}" if self.loss is not None else f"{verdict}; {verdict.where_it_rests}"
+        often = "" if self.rate is None else f" The move is {self.rate}."
+        return f"{said[0].upper()}{said[1:]}.{often} Assumed: {rig.damping}."
+
+
+def judgement(train: Train, rig: Rig) -> Judgement:
+    """What becomes of the whole train. MotorError for a move too long to be waited for."""
+    verdict = judged(train, rig)
+    loss = diagnose(train, rig) if verdict.lost else None
+    quick = rig.load.is_steady and (train.duration or 0) <= MOST_VARIED and engine.fast()
+    return Judgement(verdict, loss, loss_rate(train, rig, tried=VARIANTS) if quick else None)
 
 
 def judged(train: Train, rig: Rig) -> Verdict:

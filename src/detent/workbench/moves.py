@@ -8,9 +8,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from detent.cell.description import Description, Problem
 from detent.cell.description import Motor as Fitted
-from detent.cell.fitting import rated
+from detent.cell.fitting import load_of, rated
 from detent.controllers import catalogue
-from detent.motors.load import Load
+from detent.motors.damping import CHOPPER, usual
+from detent.motors.drive import Decay
+from detent.motors.load import NO_LOAD
 from detent.motors.motor import Motor, MotorError
 from detent.motors.named import MOTORS
 from detent.motors.rotor import Rig
@@ -51,6 +53,7 @@ class Form(BaseModel):
     current: Annotated[float, Field(gt=0, le=100)]
     inertia: Annotated[float, Field(ge=0, le=1e4)]
     friction: Annotated[float, Field(ge=0, le=1e3)]
+    damping: Annotated[float, Field(ge=0, le=2)] | None = None  # ratio; None: what is assumed
 
 
 class Moves:
@@ -102,14 +105,19 @@ class Moves:
         """What a motor makes of a move: its torque over speed, what the move asks of it, and the verdict."""
         law = self._law(wanted.unit, wanted.axis)
         async with self._one:
-            return await asyncio.to_thread(_judged, law, wanted, form, self._motors())
+            entry = self._entry(wanted.unit, wanted.axis)
+            return await asyncio.to_thread(_judged, law, wanted, form, self._motors(), entry)
 
     def _fitted(self, law: Law, unit: str, axis: str) -> dict[str, object] | None:
         """The motor that the cell file puts on an axis, as the form has it; None without one."""
+        found = self._entry(unit, axis)
+        return None if found is None else {"name": found[0], **_form(law, *found)}
+
+    def _entry(self, unit: str, axis: str) -> tuple[str, Fitted] | None:
         described = self._described()
         for name, entry in described.motors.items() if described is not None else ():
             if entry.unit == unit and (entry.axis == axis or len(self._bench.picture.units[unit].axes) == 1):
-                return {"name": name, **_form(law, name, entry)}
+                return name, entry
         return None
 
     def _described(self) -> Description | None:
@@ -121,7 +129,8 @@ class Moves:
     def _motors(self) -> dict[str, Motor]:
         """The motors to choose from: those that are known, and those of the cell that have data of their own."""
         described = self._described()
-        own = {} if described is None else {n: rated(n, entry) for n, entry in described.motors.items() if entry.data}
+        entries = {} if described is None else described.motors
+        own = {name: rated(name, entry) for name, entry in entries.items() if _named(name, entry) == name}
         return {**own, **MOTORS}
 
 
@@ -133,36 +142,54 @@ def _form(law: Law, name: str, entry: Fitted) -> dict[str, object]:
     else:
         amps = current if isinstance(current, int | float) else max(current.run, current.ramp)
     steppings = [winding.name for winding in law.windings]
-    load = Load(**{str(name): value for name, value in entry.load.items()})  # type: ignore[arg-type]
+    load = load_of(entry)
     return {
-        "motor": name if entry.data else entry.motor,
+        "motor": _named(name, entry),
         "stepping": entry.step if entry.step in steppings else (steppings or [""])[0],
         "supply": entry.supply, "current": amps, "inertia": load.inertia * 1e4, "friction": load.friction,
+        "damping": _damping(entry, rated(name, entry)),
     }  # fmt: skip
+
+
+def _named(name: str, entry: Fitted) -> str:
+    """By which name the page knows the motor of an entry: its own where it is not one of those with names."""
+    return name if entry.data or entry.wiring or entry.fitted else entry.motor
+
+
+def _damping(entry: Fitted, motor: Motor) -> float:
+    own = motor.damping if entry.damping is None else entry.damping
+    return usual(entry.decay).ratio if own is None else own
 
 
 def _facts(name: str, motor: Motor) -> dict[str, object]:
     return {
         "name": name, "title": motor.title, "supply": SUPPLY, "current": motor.current,
-        "inertia": round((motor.inertia or 1e-5) * 1e4, 5), "torque": motor.holding_torque,
+        "inertia": round((motor.inertia or 0.0) * 1e4, 5), "torque": motor.holding_torque,
+        "damping": CHOPPER.ratio if motor.damping is None else motor.damping,
     }  # fmt: skip
 
 
-def _rig(law: Law, form: Form, motors: Mapping[str, Motor]) -> Rig:
+def _rig(law: Law, form: Form, motors: Mapping[str, Motor], fitted: tuple[str, Fitted] | None) -> Rig:
     windings = {winding.name: winding for winding in law.windings}
     if form.stepping not in windings:
         raise MotorError("the size of these microsteps divides no full step: no motor can be judged with it")
     if form.motor not in motors:
         raise MotorError(f"no motor {form.motor!r}; there are: {', '.join(motors)}")
+    # the motor of the cell keeps what the form does not ask for
+    entry = fitted[1] if fitted is not None and form.motor == _named(*fitted) else None
+    rest = NO_LOAD if entry is None else load_of(entry)
+    decay: Decay = "fast" if entry is None else entry.decay
     return motion.rig(
         motors[form.motor], windings[form.stepping], supply=form.supply, current=form.current,
-        inertia=form.inertia * 1e-4, friction=form.friction,
+        inertia=form.inertia * 1e-4, friction=form.friction, damping=form.damping, rest=rest, decay=decay,
     )  # fmt: skip
 
 
-def _judged(law: Law, wanted: Axis, form: Form, motors: Mapping[str, Motor]) -> dict[str, object]:
+def _judged(
+    law: Law, wanted: Axis, form: Form, motors: Mapping[str, Motor], fitted: tuple[str, Fitted] | None
+) -> dict[str, object]:
     """Everything that is shown of a motor. Raises MotorError."""
-    rig = _rig(law, form, motors)
+    rig = _rig(law, form, motors, fitted)
     train = law.train(clipped(law, wanted.values), min(wanted.steps, law.most))
     drawn: Picture = motion.picture(train)
     per_step = rig.drive.winding.steps
@@ -173,15 +200,17 @@ def _judged(law: Law, wanted: Axis, form: Form, motors: Mapping[str, Motor]) -> 
         "asked": [[float(speed), round(float(torque), 6)] for speed, torque in zip(*asked, strict=True)],
     }
     try:
-        verdict = motion.judged(train, rig)
+        judgement = motion.judgement(train, rig)
     except MotorError as error:
         return found | {"verdict": None, "words": str(error)}
+    verdict, rate = judgement.verdict, judgement.rate
     return found | {
         "verdict": {
-            "lost": verdict.lost, "margin": verdict.margin, "angle": verdict.load_angle, "steps": verdict.steps_lost,
-            "error": verdict.error,
+            "lost": verdict.lost, "margin": verdict.margin, "angle": verdict.load_angle, "error": verdict.error,
+            "often": 0 if rate is None else rate.lost + rate.corners_lost,
+            "of": 0 if rate is None else rate.tried + rate.corners,
         },
-        "words": str(verdict),
+        "words": judgement.words(rig),
     }  # fmt: skip
 
 

@@ -76,7 +76,7 @@ def test_a_motor_is_judged_as_the_move_changes(motion: Window) -> None:
     motion.page.locator("select[name=motor]").select_option("qsh4218-41-10-035")
     verdict = motion.page.locator(".motion-verdict")
     motion.until("() => document.querySelector('.motion-verdict').dataset.kind === 'good'")
-    assert "margin" in verdict.inner_text()
+    assert "by none of" in verdict.inner_text()
     motion.picture("motion-motor")
     motion.page.locator("input[name=friction]").fill("0.1")
     for name, number in (("T", 9000), ("R", 3)):

@@ -229,16 +229,17 @@ class Motion {
   }
 
   takeMotor() {
-    const { motor, stepping, supply, current, inertia, friction } = this.form.elements,
+    const { motor, stepping, supply, current, inertia, friction, damping } = this.form.elements,
       { fitted, motors } = this.about;
     const found = motor.value === "fitted" ? fitted : motors.find(({ name }) => name === motor.value);
-    for (const field of [stepping, supply, current, inertia, friction]) field.disabled = !found;
+    for (const field of [stepping, supply, current, inertia, friction, damping]) field.disabled = !found;
     if (!found) return;
     stepping.value = found.stepping || this.about.stepping;
     supply.value = found.supply;
     current.value = found.current;
     inertia.value = +found.inertia.toPrecision(4);
     friction.value = found.friction || 0;
+    damping.value = found.damping;
   }
 
   formChanged(name) {
@@ -266,10 +267,10 @@ class Motion {
       this.again = true;
       return;
     }
-    const { motor, stepping, supply, current, inertia, friction } = this.form.elements,
+    const { motor, stepping, supply, current, inertia, friction, damping } = this.form.elements,
       { fitted, units } = this.about;
     const numbers = Object.fromEntries(
-      Object.entries({ supply, current, inertia, friction }).map(([name, field]) => [name, Number(field.value)]),
+      Object.entries({ supply, current, inertia, friction, damping }).map(([name, field]) => [name, Number(field.value)]),
     );
     this.judging = true;
     if (!this.charts.torque.what || this.charts.torque.what.note) this.charts.torque.draw({ note: "Computing \u2026" });
@@ -314,9 +315,10 @@ class Motion {
     });
     const { verdict } = found;
     if (!verdict) this.verdict("", "");
-    else if (verdict.lost)
-      this.verdict(verdict.steps ? `${Math.abs(verdict.steps)} full steps lost` : "lost, and caught again", "bad");
-    else this.verdict(`no step lost, margin ${Math.round(verdict.margin * 100)} %`, "good");
+    else if (verdict.lost) this.verdict("steps lost", "bad");
+    else if (verdict.often) this.verdict(`no step lost, but by ${verdict.often} of ${verdict.of} variants`, "bad");
+    else if (verdict.of) this.verdict(`no step lost, by none of ${verdict.of} variants`, "good");
+    else this.verdict("no step lost", "good");
   }
 
   verdict(text, kind) {

@@ -31,7 +31,13 @@ def offer(site: "FastAPI", bench: "Bench", live: "Live") -> None:
 
 
 _FACTS = {"duration": "takes", "peak": "peak", "mean": "mean", "up": "speeding up", "down": "slowing down"}
-_FIELDS = {"supply": "supply, V", "current": "current, A", "inertia": "load, kg cm²", "friction": "friction, Nm"}
+_FIELDS = {
+    "supply": "supply, V",
+    "current": "current, A",
+    "inertia": "load, kg cm²",
+    "friction": "friction, Nm",
+    "damping": "damping ratio",
+}
 
 
 def _tab(unit: "UnitPicture", axis: str) -> str:
