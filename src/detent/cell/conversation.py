@@ -65,6 +65,7 @@ class Conversation:
     def __init__(self) -> None:
         self.exchanges: list[Exchange] = []
         self.refused: list[tuple[str, Refused, Exchange | None]] = []  # the unit, and the line that it belongs to
+        self.unasked: dict[int, bytearray] = {}  # by line: what was heard before anybody had said anything there
         self.scripted = True  # whether what is typed now comes from the cell's script
         self._cell: Cell | None = None
         self._of_line: dict[int, list[Exchange]] = {}  # those that may still be answered
@@ -81,6 +82,7 @@ class Conversation:
         cell = self._cell
         assert cell is not None
         number = cell.wiring.line_of[cell.unit(unit)]
+        self._close(number)
         begins = max(cell.now, cell.lines[number].host_busy_until)
         exchange = Exchange(cell.now, unit, text, self.scripted, number, begins)
         self.exchanges.append(exchange)
@@ -91,8 +93,14 @@ class Conversation:
         cell = self._cell
         if cell is None:
             return
-        for number, open_ones in self._of_line.items():
-            line = cell.lines[number]
+        for number, line in enumerate(cell.lines):
+            if line.hosted or not line.heard:
+                continue
+            open_ones = self._of_line.get(number)
+            if open_ones is None:
+                kept = self.unasked.setdefault(number, bytearray())
+                kept += bytes(heard.char.value & 0xFF for heard in line.take())[: MOST_HEARD - len(kept)]
+                continue
             self._close(number)
             for heard in line.take():
                 while len(open_ones) > 1 and self._turn(open_ones[1]) <= heard.at:
@@ -104,6 +112,17 @@ class Conversation:
         """What the host reads in what it has heard."""
         assert self._cell is not None
         return self._cell.talker(exchange.unit).answers(bytes(exchange.heard))
+
+    def said(self) -> dict[str, list[str]]:
+        """What units said unasked, by unit: of those that hold programs, which may speak; others only sign on."""
+        found: dict[str, list[str]] = {}
+        for number, heard in self.unasked.items():
+            assert self._cell is not None
+            unit = self._cell.wiring.names[self._cell.wiring.lines[number][0][0]]
+            part = self._cell.controllers().get(unit)
+            if part is not None and catalogue.model(part.model).language is not None and part.answers(bytes(heard)):
+                found[unit] = part.answers(bytes(heard))
+        return found
 
     def note_refusal(self, unit: int, refused: Refused) -> None:
         """A unit turns a line down."""

@@ -161,11 +161,7 @@ class Delivery:
         name = f"{self.wiring.names[index]}.{pin}"
         self._deliveries[name] += 1
         if self._deliveries.total() > MOST_DELIVERIES:
-            pins = ", ".join(pin for pin, count in self._deliveries.most_common(8) if count > 1)
-            raise Oscillation(
-                f"more than {MOST_DELIVERIES} level changes at {self.now} ns: {pins} change each other without end; "
-                "break the loop or put something that takes time into it"
-            )
+            raise self._oscillation()
         if index < self.wiring.units and self.recording is not None:
             self.recording.extend(index, (InputSet(self.now, pin, level),))
         part = self.parts[index]
@@ -174,6 +170,21 @@ class Delivery:
         else:
             part.set_pin(pin, level, self.now)
         self._touched.add(index)
+
+    def _oscillation(self) -> Oscillation:
+        """The error that names the inputs which change without end, each with the outputs that drive it."""
+        names = self.wiring.names
+        loops: list[str] = []
+        for name in [name for name, count in self._deliveries.most_common(8) if count > 1]:
+            part, _, pin = name.rpartition(".")
+            net = self.net_read(names.index(part), pin)
+            drivers = self.nets[net].levels if net is not None else ()
+            driven = " and ".join(f"{names[driver]}.{output}" for driver, output in drivers)
+            loops.append(f"{name} (driven by {driven})" if driven else name)
+        return Oscillation(
+            f"more than {MOST_DELIVERIES} level changes at {self.now} ns: {', '.join(loops)} change without end; "
+            "break the loop or put something that takes time into it"
+        )
 
     def _match_line(self, number: int) -> None:
         """The host of a line speaks as all its units are strapped to hear, from the moment one is switched on."""

@@ -37,8 +37,8 @@ PATIENCE: Ns = 60 * SECOND  # how long a step waits for the next instruction
 MOST_EVENTS = 200_000  # likewise
 MOST_WAITING = 50_000  # batches that nobody has asked for: then a cell that runs as fast as it goes waits
 
-FAULTS = (Oscillation, MotorError)
-"""What a cell raises that cannot go on."""
+FAULTS = (Oscillation, MotorError, AssertionError, ArithmeticError, IndexError, AttributeError, RecursionError)
+"""What a deed makes a cell raise that cannot go on; other errors say that the deed is none."""
 
 Address = tuple[int, int]
 """A unit, by its number, and a byte of its program memory."""
@@ -195,7 +195,7 @@ class History:
                 if self.stopped:
                     return
             cell.run_to(until)
-        except FAULTS as error:
+        except Exception as error:  # of a unit, whatever it is: the cell stops, and who serves it goes on
             self._break(error)
 
     def send(self, line: int, data: Chars) -> None:
@@ -273,7 +273,8 @@ class History:
             self.send(*sent)
 
     def _break(self, error: Exception) -> None:
-        self._here.broken = f"{error} (go back on the time line, or begin anew)"
+        kind = "" if isinstance(error, (Oscillation, MotorError)) else f"{type(error).__name__}: "
+        self._here.broken = f"{kind}{error} (go back on the time line, or begin anew)"
         self._look()
         self.stop(self.broken)
 

@@ -43,6 +43,11 @@ class Outcome(NamedTuple):
         return self.conversation.refused
 
     @property
+    def said(self) -> dict[str, list[str]]:
+        """What units said unasked."""
+        return self.conversation.said()
+
+    @property
     def scripted(self) -> "list[Exchange]":
         """What the cell's script sent."""
         return [exchange for exchange in self.conversation.exchanges if exchange.scripted]
@@ -94,6 +99,8 @@ def facts(told: Outcome) -> dict[str, object]:
         result["exchanges"] = [{"unit": one.unit, "sent": one.sent, "answers": answers(one)} for one in told.sent]
     if told.unsent:
         result["unsent"] = [line._asdict() for line in told.unsent]
+    if told.said:
+        result["said"] = told.said
     if told.scripted:
         result["script"] = [
             {"at_ns": one.at, "unit": one.unit, "sent": one.sent, "answers": answers(one)} for one in told.scripted
@@ -140,6 +147,9 @@ def show(told: Outcome, written: Sequence[Path]) -> None:
     cell, conversation = told.cell, told.conversation
     conversation.listen()
     several = len(cell.controllers()) > 1
+    for speaker, lines in told.said.items():
+        for line in lines:
+            console.print(f"< {speaker + ': ' if several else ''}{line}", markup=False)
     scripted = 0
     for one in conversation.exchanges:
         scripted += one.scripted

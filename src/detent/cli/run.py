@@ -241,8 +241,6 @@ class _Course:
         if self._until is not None and cell.now >= self._until and after is not None and after > self._until:
             return False
         cell.run_to(cell.now)  # what the script does in this instant comes first
-        conversation.listen()
-        wire.take()
         conversation.scripted = False
         cell.type(line.unit, line.text)
         conversation.scripted = True

@@ -72,8 +72,8 @@ def serve(
     json
         Print one line of JSON once everything is open, and nothing else.
     """
-    from detent.cell.delivery import Oscillation
     from detent.cell.description import Problem
+    from detent.cli import FAILED
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
     from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost
@@ -98,7 +98,7 @@ def serve(
     try:
         try:
             service = Service(found.description, found.read, wanted, pace=pace, line_timing=line_timing,
-                              images=images, observed=control_at is not None)  # fmt: skip
+                              images=images, observed=control_at is not None, on_stop=_tell_stop)  # fmt: skip
             url = _control(service, control_at, token)
         except (Problem, EndpointError) as error:
             asked_wrongly(error)
@@ -115,12 +115,19 @@ def serve(
             gc.freeze()  # what is there now stays: no collection shall look at it while a deadline waits
             try:
                 service.run()
-            except (EndpointLost, Oscillation) as error:
+            except EndpointLost as error:
                 failed(error)
         if not json:
             _print_end(service)
+        if service.stopped:
+            raise SystemExit(FAILED)
     finally:
         images.close()
+
+
+def _tell_stop(why: str) -> None:
+    print(f"detent: {why}", file=sys.stderr)
+    print("detent: it hears nothing any more, and can be looked at; Ctrl-C ends it.", file=sys.stderr, flush=True)
 
 
 def asked_endpoints(

@@ -20,7 +20,8 @@ def time_of(service: Service) -> Answer:
     """The time of the cell, and whether it stands."""
     pace = service.pace
     factor = None if pace.free else float(pace.factor)
-    return {"time_ns": service.cell.now, "paused": pace.held, "pace": factor}
+    stopped: Answer = {"stopped": service.stopped} if service.stopped else {}
+    return {"time_ns": service.cell.now, "paused": pace.held, "pace": factor, **stopped}
 
 
 def whole_state(service: Service) -> Answer:

@@ -9,11 +9,13 @@ from typing import NamedTuple, TypeVar
 
 from detent.cell.build import build
 from detent.cell.cell import Cell
-from detent.cell.delivery import Store, no_store
+from detent.cell.delivery import Oscillation, Store, no_store
 from detent.cell.description import Description, Problem
 from detent.cell.mechanics import Mechanics
+from detent.motors.motor import MotorError
 from detent.realtime.endpoints.endpoint import Endpoint
 from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.guarded import Guarded
 from detent.realtime.images import Images
 from detent.realtime.loop import BEHIND, Loop, stopped_by_signals, wake_exactly
 from detent.realtime.pace import LatenessSummary, Pace
@@ -46,10 +48,12 @@ class Service:
         line_timing: bool = True,
         images: Images | None = None,
         observed: bool = False,
+        on_stop: Callable[[str], None] = lambda why: None,
     ) -> None:
         """Build the cell and open what is `wanted` for every line; nothing: what the cell file says, or a pty.
 
         `images` stay their owner's. One that is `observed` can be looked at and meddled with (`realtime.control`).
+        `on_stop` is told when the cell cannot go on; it is served all the same.
         Raises Problem, EndpointError, ValueError.
         """
         self.description = description
@@ -69,13 +73,32 @@ class Service:
             self.pace = Pace(pace, origin=self.cell.now)
             patience = [line.format.duration(BEHIND) for line in self.cell.lines]
             self.watched = Watched(self.cell, self.pace) if observed else None
-            self._loop = Loop(self.watched or self.cell, self.pace, self._opened, patience=patience)
+            self.guarded = Guarded(self.watched or self.cell, self._stopped)
+            self._on_stop = on_stop
+            self._loop = Loop(self.guarded, self.pace, self._opened, patience=patience)
             opening.callback(self._loop.close)
             self._cleanup = opening.pop_all()
 
     def ask(self, function: Callable[[], T]) -> "Future[T]":
         """Call `function` soon on the thread that serves; from any thread. Cancelled when the service is closed."""
-        return self._loop.ask(function)
+        return self._loop.ask(lambda: self._asked(function))
+
+    @property
+    def stopped(self) -> str:
+        """Why the cell stands and cannot go on; "" as long as it can."""
+        return self.guarded.stopped
+
+    def _asked(self, function: Callable[[], T]) -> T:
+        try:
+            return function()
+        except (Oscillation, MotorError) as error:  # of the cell, which is no longer whole
+            self.guarded.stop(error)
+            raise
+
+    def _stopped(self, why: str) -> None:
+        if self.watched is not None:
+            self.watched.close()  # nobody waits for what cannot happen
+        self._on_stop(why)
 
     def ends_with(self, close: Callable[[], None]) -> None:
         """Call `close` before the service is closed."""
@@ -90,7 +113,7 @@ class Service:
         self.pace.restart(self.cell.now)
 
     def run(self) -> None:
-        """Serve until `stop`, also one that was called already. Raises EndpointLost, and what the cell raises."""
+        """Serve until `stop`, also one that was called already. Raises EndpointLost."""
         wake_exactly()
         self.restart_clock()  # the time since the cell was made was ours, not the cell's
         self._loop.run()
