@@ -84,21 +84,27 @@ def list_(model: str, file: Path, *, json: bool = False) -> None:
 def disasm(model: str, file: Path, *, output: Path | None = None, json: bool = False) -> None:
     """Turn a program image back into source, with labels for its jumps.
 
+    The EEPROM file of a unit that `serve` keeps is taken as well.
+
     Parameters
     ----------
     model
         The controller: gs-c200, gs-c200s, ...
     file
-        The image, as `asm` and the controller's EEPROM file have it.
+        The image that `asm` wrote, or an EEPROM file.
     output
         A file to write instead of the terminal; it is replaced whole or not at all.
     json
         Print the source and its facts as JSON.
     """
+    from detent.realtime.images import ImageUnreadable, image_in
+
     language = _language(model)
-    image = _read(file)
     try:
+        image = image_in(_read(file), model)
         source = disassemble(language, image)
+    except ImageUnreadable as error:
+        raise _asked_wrongly(f"{file}: {error}") from error
     except ImageError as error:
         raise _asked_wrongly(f"{file}: {error}; is it an image for the {model}?") from error
     if output is not None:

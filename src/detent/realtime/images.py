@@ -191,6 +191,11 @@ def pack(image: bytes, model: str) -> bytes:
     return data + _CRC.pack(zlib.crc32(data))
 
 
+def image_in(data: bytes, model: str) -> bytes:
+    """The image in a file that holds one as it is, or packed as it is kept here. Raises ImageUnreadable."""
+    return unpack(data, model) if data.startswith(MAGIC) else data
+
+
 def unpack(data: bytes, model: str) -> bytes:
     """The image in the content of a file. Raises ImageUnreadable."""
     if data[: len(MAGIC)] != MAGIC:

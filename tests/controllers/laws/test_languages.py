@@ -1,0 +1,221 @@
+"""What a language prints it takes back: the same program at the same addresses, or a refusal.
+
+Sources are made by number. They go through every way out of the product and back in: asm in each of its formats, list,
+disasm, upload and download, backup and restore, and the EEPROM file that serve keeps.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+from tests.controllers.laws.histories import ORDINARY, THOROUGH, History, hold
+from tests.controllers.laws.models import OPEN
+
+from detent.assembler import Assembly, AssemblyFailed, assemble, disassemble, listing
+from detent.cell.build import build
+from detent.cell.cell import Cell
+from detent.cell.description import parse
+from detent.cell.host import HostPort
+from detent.cli import assemble as verbs
+from detent.cli import program as program_verbs
+from detent.controllers import catalogue
+from detent.hosts.backups import Backup
+from detent.hosts.dcb274 import BlockingDcb274, Dcb274
+from detent.hosts.gsc200 import BlockingGsC200, GsC200
+from detent.realtime.images import pack
+
+Line = Callable[[Random], str]
+
+
+def gsc(draw: Random, sign: str) -> str:
+    """A line that both modules store."""
+    steps = draw.choice((1, 40, 999_999, draw.randint(1, 999_999)))
+    n, pin = draw.randint(1, 999), draw.randint(1, 3)
+    return draw.choice((f"A{pin}", f"C{pin}", f"U{pin}", f"W{pin}", f"D{min(n, 255)}", "L0", f"L{min(n, 255)}", f"R{n}",
+                        f"S{n + 1}", f"T{n + 1}", f"{sign}{steps}", f"{sign}{steps}"))  # fmt: skip
+
+
+def c200(draw: Random) -> str:
+    own = (f"G{draw.randint(0, 9_999_999)}", "G0", "G+", "G-2", "G+3")
+    return draw.choice(own) if draw.random() < 0.3 else gsc(draw, draw.choice("+-"))
+
+
+def c200s(draw: Random) -> str:
+    place = draw.randint(-8_388_608, 8_388_607)
+    own = (f"G{place:+d}", f"f{place:+d}", "g+", "g-2", "g+1", "I1", "I3", "j first", "jc7,first", "jc0,last", "j last")
+    return draw.choice(own) if draw.random() < 0.5 else gsc(draw, draw.choice("+-"))
+
+
+def smc(draw: Random) -> str:
+    """A line that program mode of a DCB-274 stores."""
+    place = draw.choice((0, 1, -1, 500, 8_388_607, -8_388_607, draw.randint(-8_388_607, 8_388_607)))
+    rate = draw.choice((40, 41, 800, 899, 900, 10_000, 36_000, draw.randint(40, 36_000)))
+    byte = draw.randint(0, 255)
+    return draw.choice((
+        f"+ {abs(place)}", f"- {abs(place) * 2}", f"R {place}", f"O {place}", "O", f"I {rate}", f"V {rate}",
+        f"M {rate}", f"M -{rate}", "M 0", f"F {rate} {byte % 2}", f"K {byte} {draw.randint(0, 255)}", f"B {byte} 9",
+        f"W {draw.randint(0, 65_535)}", f"w {byte}", f"A {draw.choice((0, 8, 16, 24, 129))}", f"D {max(byte, 1)}",
+        f"H {byte % 6}", f"b {byte}", f"l {draw.choice((0, 1, 8, 9, 32))}", "Z", "Z 1", "^", "@", "] 0", "] 1", "E 3",
+        f"Y {byte % 101} 80", f"k {place} {byte % 64}", f"i {place} {byte % 64}", "T 900 first", "T 5 0", "| A", "|B",
+        f"J first {byte}", "J last 3", f"L 2048 {byte % 10}", f"L first {byte % 10}",
+        "G first", "G last 1", "G 2048", "G 0 1",
+    ))  # fmt: skip
+
+
+def source(draw: Random, model: str) -> str:
+    """A program with labels; that of a DCB-274 in one to three places."""
+    line: Line = {"gs-c200": c200, "gs-c200s": c200s, "dcb-274": smc}[model]
+    lines = []
+    places = draw.sample((0, 7, 128, 160, 256, 300, 1600, 2000), draw.randint(1, 3)) if model == "dcb-274" else [0]
+    room = {0: 6, 7: 20, 128: 5, 160: 5, 256: 8, 300: 30, 1600: 30, 2000: 8}
+    first = draw.randrange(len(places))
+    for n, place in enumerate(places):
+        if model == "dcb-274" and (place or n or draw.random() < 0.5):
+            lines.append(f"P {place}")
+        count = draw.randint(1, room[place] if model == "dcb-274" else 12)
+        count = min(count, 1) if place == 0 and model == "dcb-274" else count  # another may stand at 7
+        lines += ["first:"] * (n == first)
+        lines += [line(draw) for _ in range(count)]
+        if n == len(places) - 1:
+            lines += ["last:", line(draw)]
+        if model == "dcb-274" and draw.random() < 0.7:
+            lines.append("P")
+    return "\n".join(text + draw.choice(("", "", "  ; a comment")) for text in lines) + "\n"
+
+
+def places(assembly: Assembly[Any]) -> Mapping[int, str]:
+    """The program: each instruction by its address."""
+    return {placed.address: placed.text for placed in assembly.placed}
+
+
+def taken(model: str, text: str) -> Assembly[Any] | None:
+    """What the assembler makes of a source; None if it refuses it."""
+    try:
+        return assemble(catalogue.language(model), text)
+    except AssemblyFailed:
+        return None
+
+
+def what_is_printed_is_taken_back(model: str, text: str) -> bool:
+    language, made = catalogue.language(model), taken(model, text)
+    if made is None:
+        return False
+    program = places(made)
+    typed = taken(model, verbs._formatted(made, "commands").decode())
+    assert typed is not None, "what asm prints is refused"
+    assert places(typed) == program, "asm --format commands is another program"
+    image = verbs._formatted(made, "image")
+    again = taken(model, disassemble(language, image))
+    assert again is not None, "what disasm prints is refused"
+    assert places(again) == program, "asm and disasm make another program"
+    assert bytes.fromhex(verbs._formatted(made, "hex").decode()) == image
+    shown = taken(model, listing(made))
+    assert shown is None or places(shown) == program, "list is taken for another program"
+    return True
+
+
+def file_of_the_eeprom_is_taken(model: str, text: str, folder: Path) -> bool:
+    made = taken(model, text)
+    if made is None:
+        return False
+    cell = build(parse(f'[units.u]\nmodel = "{model}"', "cell"), str)
+    unit = cell.controller("u")
+    unit.restore(verbs._formatted(made, "image"))
+    file = folder / "u.eeprom"
+    file.write_bytes(pack(unit.kept_memory(), model))
+    verbs.disasm(model, file, output=folder / "u.src")
+    again = taken(model, (folder / "u.src").read_text())
+    assert again is not None, "what disasm makes of the EEPROM file is refused"
+    found = places(again)
+    assert {at: found.get(at) for at in places(made)} == places(made), "disasm makes another program of the EEPROM file"
+    return True
+
+
+def module(model: str) -> tuple[Cell, Any]:
+    """A unit that has just left the factory, and its driver."""
+    cell = build(parse(f'[units.u]\nmodel = "{model}"', "cell"), str, line_timing=False)
+    port = HostPort(cell)
+    if model == "dcb-274":
+        return cell, BlockingDcb274(Dcb274(), port)
+    return cell, BlockingGsC200(GsC200(model), port)
+
+
+def units_keep_programs(model: str, text: str) -> bool:
+    """Upload, download, backup and restore."""
+    made = taken(model, text)
+    if made is None:
+        return False
+    program, language = places(made), catalogue.language(model)
+    cell, driver = module(model)
+    driver.write_program(program_verbs._lines(made))
+    memory = cell.controller("u").program_memory()
+    for placed in made.placed:
+        assert memory[placed.address : placed.address + len(placed.code)] == placed.code, f"{placed.text} is elsewhere"
+    starts = sorted({at for at in program if not any(p.address + len(p.code) == at for p in made.placed)})
+    for start in starts if model == "dcb-274" else [0]:
+        lines = driver.read_program(start) if model == "dcb-274" else driver.read_program()
+        again = taken(model, program_verbs._source(language, lines))
+        assert again is not None, "what download prints is refused"
+        for address, told in places(again).items():
+            assert program.get(address, told) == told, f"download has {told} at {address}"
+        assert start in places(again), f"download has moved the program of {start}"
+    driver.save()
+    saved = Backup.parse(Backup(model, driver.saved()).text())
+    other, second = module(model)
+    second.restore(saved.saved)
+    here, there = (one.controller("u").kept_memory() for one in (cell, other))
+    assert here == there, "restore makes another memory than the one that was saved"
+    return True
+
+
+LANGUAGES = [name for name in ("gs-c200", "gs-c200s", "dcb-274") if name not in OPEN.get("languages", ())]
+every_language = pytest.mark.parametrize("model", LANGUAGES)
+
+
+def check(law: Callable[[str, str], bool], model: str, count: int, least: int) -> None:
+    def make(draw: Random) -> tuple[History, str]:
+        return History({}, (), ()), source(draw, model)
+
+    told = hold(lambda _, text: law(model, text), make, count, f"{law.__name__} of {model}")
+    assert told >= least, f"{count - told} of {count} sources are refused"
+
+
+@every_language
+def test_what_is_printed_is_taken_back(model: str) -> None:
+    check(what_is_printed_is_taken_back, model, ORDINARY, ORDINARY // 2)
+
+
+@every_language
+def test_the_eeprom_file_is_taken_for_an_image(model: str, tmp_path: Path) -> None:
+    def law(model: str, text: str) -> bool:
+        return file_of_the_eeprom_is_taken(model, text, tmp_path)
+
+    check(law, model, ORDINARY // 10, ORDINARY // 20)
+
+
+@every_language
+def test_units_keep_programs(model: str) -> None:
+    check(units_keep_programs, model, 8, 4)
+
+
+@pytest.mark.slow
+@every_language
+def test_what_is_printed_is_taken_back_of_many_more_programs(model: str) -> None:
+    check(what_is_printed_is_taken_back, model, THOROUGH, THOROUGH // 2)
+
+
+@pytest.mark.slow
+@every_language
+def test_the_eeprom_file_is_taken_for_an_image_of_many_more_programs(model: str, tmp_path: Path) -> None:
+    def law(model: str, text: str) -> bool:
+        return file_of_the_eeprom_is_taken(model, text, tmp_path)
+
+    check(law, model, 1000, 500)
+
+
+@pytest.mark.slow
+@every_language
+def test_units_keep_many_more_programs(model: str) -> None:
+    check(units_keep_programs, model, 300, 150)
