@@ -157,6 +157,7 @@ class Board:
         self._groups = {group.oid: group for group in self._buttons}
         self._recovering = False
         self._fresh = False  # it had to be configured
+        self._was_down = False  # it was found shut down, with its outputs at `off`
         self._known = False  # it was ready once, so that positions mean something
         self._begin_at: WallNs = 0
         self._wait_until: WallNs | None = None
@@ -442,6 +443,7 @@ class Board:
         is_config, is_shutdown = message.number("is_config"), message.number("is_shutdown")
         if is_config and message.number("crc") & 0xFFFFFFFF == crc:
             if is_shutdown:
+                self._was_down = True
                 core.command("clear_shutdown")
                 core.ask("get_config", "config", self._configured, wall)
                 return
@@ -449,7 +451,7 @@ class Board:
             for stop in self.stops.values():
                 stop.clear()
             # what a host before us has queued is let go
-            self._wait_until = wall + (0 if self._fresh or self._recovering else DYING)
+            self._wait_until = wall + (0 if self._fresh or self._was_down else DYING)
             self._fresh_if_waiting(wall)
             return
         if is_config or is_shutdown:
@@ -544,13 +546,8 @@ class Board:
             axis.halt()
         for wire in self._wires.values():
             wire.clear()
-        fallen = self._recovering and not self._fresh
         for out in self.outs.values():
-            out.began(wall, out.setup.off if fallen else None)
-            if not self._fresh and not fallen:
-                out.level = not out.setup.initial  # not known: it is said once
-                out.now(out.setup.initial)
-                out.commit(wall)
+            self._begin_out(out, wall)
         for driver in self.drivers.values():
             driver.began()
         if self._recovering and self._known:
@@ -559,7 +556,18 @@ class Board:
             self.core.events.append(Recovered(self.name, shafts, dict(self.inputs)))
         else:
             self.core.events.append(Ready(self.name, self._fresh, dict(self.inputs)))
-        self._recovering, self._fresh, self._known = False, False, True
+        self._recovering, self._fresh, self._known, self._was_down = False, False, True, False
+
+    def _begin_out(self, out: DigitalOut, wall: WallNs) -> None:
+        """Its level is known where the board was configured or shut down; else it is said once."""
+        if self._fresh:
+            out.began(wall)
+            return
+        wanted = out.setup.off if self._recovering else out.setup.initial
+        out.began(wall, out.setup.off if self._was_down else not wanted)
+        if out.level is not wanted:
+            out.now(wanted)
+            out.commit(wall)
 
     # -- what goes wrong
 

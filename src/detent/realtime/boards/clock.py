@@ -1,8 +1,9 @@
 """A board's clock, estimated from round trips: which tick it is at a wall time.
 
 Asked at `sent`, answered at `received`, the board read its clock somewhere between. Slow round trips say little; a
-straight line through the quicker half of the last ones says where the clock stands and how fast it runs. Until two
-seconds have been seen its nominal frequency counts. 32 bits come back; they are extended to the nearest whole count.
+straight line through the quicker half of the last ones, old and new alike, says where the clock stands and how fast it
+runs. Until two seconds have been seen its nominal frequency counts. 32 bits come back; they are extended to the nearest
+whole count.
 """
 
 from collections import deque
@@ -12,6 +13,7 @@ from detent.realtime.pace import WallNs
 from detent.ticks import SECOND, Ns
 
 KEPT = 32  # round trips
+GROUP = 4
 SEEN: WallNs = 2 * SECOND  # from which on the slope is measured
 WRAP = 1 << 32
 
@@ -51,8 +53,12 @@ class Clock:
     def note(self, tick: int, sent: WallNs, received: WallNs) -> None:
         """A round trip; `tick` is a whole count."""
         self.trips.append(_Trip((sent + received) // 2, received - sent, tick))
-        quick = sorted(self.trips, key=lambda trip: trip.length)[: max(len(self.trips) // 2, 1)]
-        zero = quick[0]
+        # the quicker half of every few that follow each other: old ones and new ones alike
+        trips = list(self.trips)
+        groups = [sorted(trips[i : i + GROUP], key=lambda trip: trip.length) for i in range(0, len(trips), GROUP)]
+        slow = 2 * sorted(trip.length for trip in trips)[len(trips) // 2]
+        quick = [trip for group in groups for trip in group[: -(-len(group) // 2)] if trip.length <= slow]
+        zero = quick[-1]
         self._wall, self._whole = zero.middle, zero.tick
         n = len(quick)
         walls = [trip.middle - zero.middle for trip in quick]

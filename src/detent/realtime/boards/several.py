@@ -2,14 +2,15 @@
 
 The first board is the master. Cell time is its time: a nominal second is so many of its own ticks, so that trains need
 no scaling. Other boards get their ticks by regression: of their clocks on the wall clock, and of that on the master.
-Their line is drawn anew every second, from the tick at which it stands, to meet the estimate two seconds later: no
-pulse jumps.
+Their line is drawn anew every second: at rest where it should be, in motion from the tick at which it stands, to meet
+the estimate two seconds later, so that no pulse jumps.
 """
 
 from collections.abc import Sequence
 
 from detent.outputs.steps import Scale
 from detent.realtime.boards.board import Board, State
+from detent.realtime.boards.clock import Clock
 from detent.realtime.boards.drivers import Driver
 from detent.realtime.boards.events import Event
 from detent.realtime.boards.outs import DigitalOut
@@ -67,6 +68,10 @@ class Boards:
         self.lead: Ns = self.master.setup.lead
         self._aligned: tuple[Ns, Ns] | None = None  # (cell time, board ns)
         self._redrawn: Ns = 0
+        # a board that starts again has another clock: its time goes on where the old one stood
+        self._clock: Clock | None = None  # of the master
+        self._bias: Ns = 0  # what it is behind
+        self._clocks: dict[str, Clock] = {}
         self._reopen_at: dict[str, WallNs] = {}
         self._committed: WallNs = 0
 
@@ -74,18 +79,20 @@ class Boards:
 
     def ns_at(self, wall: WallNs) -> Ns:
         """The master's time at `wall`, in its own nanoseconds; never less than what was answered before."""
-        return self.master.core.clock.ns_at(wall)
+        clock = self._clock or self.master.core.clock
+        return clock.ns_at(wall) + self._bias
 
     def wall_at(self, board_ns: Ns) -> WallNs:
         """The first wall time at which the master's time is at least `board_ns`, as far as is known now."""
-        return self.master.core.clock.wall_at_ns(board_ns)
+        clock = self._clock or self.master.core.clock
+        return clock.wall_at_ns(board_ns - self._bias)
 
     def align(self, cell: Ns, board_ns: Ns) -> None:
         """Cell time `cell` is the master's time `board_ns`: with which everything begins. Pins are a lead later."""
         self._aligned = cell, board_ns
         self._redrawn = cell
         frequency = self.master.frequency
-        tick = (board_ns + self.lead) * frequency // SECOND
+        tick = (board_ns - self._bias + self.lead) * frequency // SECOND
         self.master.core.scale = Scale(frequency, SECOND, tick, cell)
         for board, _ in self._pairs[1:]:
             self._draw(board, cell, None)
@@ -101,6 +108,23 @@ class Boards:
         """The wall time at which the cell is at `cell`, as far as is known now. Only behind `align`."""
         assert self._aligned is not None
         return self.wall_at(self._aligned[1] + cell - self._aligned[0])
+
+    def _new_clock(self, board: Board, wall: WallNs) -> None:
+        """A board is ready, with a clock that was not known before."""
+        clock = board.core.clock
+        if self._clocks.get(board.name) is clock:
+            return
+        self._clocks[board.name] = clock
+        if board is self.master:
+            if self._clock is not None:
+                self._bias += self._clock.ns_at(wall) - clock.ns_at(wall)
+            self._clock = clock
+        if self._aligned is None:
+            return
+        if board is self.master:
+            self.align(self.cell_at(wall), self.ns_at(wall))
+        else:
+            self._draw(board, self.cell_at(wall), None)
 
     def _draw(self, board: Board, now: Ns, tick: int | None) -> None:
         """The line of cell time to ticks of another board from `now` on, where it is at `tick` (None: anywhere)."""
@@ -135,7 +159,10 @@ class Boards:
         if self._aligned is not None and now - self._redrawn >= REDRAW_EVERY:
             self._redrawn = now
             for board, _ in self._pairs[1:]:
-                self._draw(board, now, board.core.scale.tick(now))
+                if board.state is not State.READY:
+                    continue
+                still = all(stepper.over(wall) for stepper in board.steppers.values())
+                self._draw(board, now, None if still else board.core.scale.tick(now))
                 for stepper in board.steppers.values():
                     stepper.rescale()
         for board, port in self._pairs:
@@ -207,6 +234,8 @@ class Boards:
             if at is not None and wall >= at:
                 self._read(board, port, wall)
             board.due(wall)
+            if board.state is State.READY:
+                self._new_clock(board, wall)
             self._pump(board, port, wall)
             again = self._reopen_at.get(board.name)
             if again is not None and wall >= again:
@@ -243,6 +272,8 @@ class Boards:
             return
         if data:
             board.receive(data, wall)
+            if board.state is State.READY:
+                self._new_clock(board, wall)
             self._pump(board, port, wall)
 
     def _pump(self, board: Board, port: Port, wall: WallNs) -> None:

@@ -158,6 +158,11 @@ class Stepper:
         if self.told_through is None or rest > self.lag + SETTLED:
             self._lag = 0
 
+    def over(self, wall: WallNs) -> bool:
+        """Whether it rests, and the last pulse sent has come."""
+        last = max((channel.last for channel in self._channels if channel.last is not None), default=NOWHERE)
+        return not self._spans and self._core.clock.tick_at(wall) > last
+
     def adopt(self, shaft: int) -> None:
         """The shaft of the axis is `shaft` now, where the firmware stands: at the start, and behind a restart."""
         self._offset = shaft - self._counted()

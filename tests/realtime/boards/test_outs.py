@@ -1,0 +1,129 @@
+"""Outputs: a change comes at its tick, is held back while it can still be taken back, and corrected where it cannot."""
+
+from tests.realtime.boards.bench import Bench, bench
+
+from detent.ramps import constant_acceleration
+from detent.realtime.boards.setup import OutSetup, Pin
+from detent.ticks import MS, SECOND
+
+
+def changes(made: Bench, pin: str = "gpio6") -> list[tuple[int, bool]]:
+    """(cell time at which the pin changed, less the lead; level), in whole us."""
+    scale = made.boards.master.core.scale
+    edges = [(tick, level) for tick, name, level in made.machine.edges if name == pin and tick >= scale.offset]
+    return [(round(scale.time(tick) / 1000), level) for tick, level in edges]
+
+
+def test_a_change_comes_a_lead_behind_its_time_with_the_step_of_that_time() -> None:
+    made = bench()
+    made.move(constant_acceleration.move(200, 1000, 50, 300).train, 1)
+    train = made.axes["slide"].train
+    assert train is not None
+    made.boards.outs["MOV"].set(True, made.now)
+    made.until(lambda: not made.axes["slide"].moving)
+    made.boards.outs["MOV"].set(False, train.time_of(300))
+    made.rest()
+    assert changes(made) == [(0, True), (round(train.time_of(300) / 1000), False)]
+    last_step, last_edge = made.machine.steps[-1][0], made.machine.edges[-1][0]
+    assert abs(last_step - last_edge) <= 17  # the error of a pulse, and a tick
+
+
+def test_changes_of_one_instant_come_in_order() -> None:
+    made = bench()
+    for level in (True, False, True):
+        made.boards.outs["MOV"].set(level, 5 * MS)
+    made.run(100 * MS)
+    ticks = [tick for tick, pin, _ in made.machine.edges if pin == "gpio6"][-3:]
+    assert ticks[1] - ticks[0] == ticks[2] - ticks[1] == 1
+
+
+def test_what_was_not_given_to_the_board_is_taken_back_without_a_trace() -> None:
+    made = bench()
+    out = made.boards.outs["MOV"]
+    at = made.now
+    out.set(True, at + 1)
+    made.run(5 * MS)  # of a lead of 30: it is still here
+    out.rewind(at)
+    made.run(100 * MS)
+    assert changes(made) == []
+    assert out.corrections == 0
+
+
+def test_what_has_left_is_corrected() -> None:
+    made = bench()
+    out = made.boards.outs["MOV"]
+    out.set(True, made.now + 1)
+    at = made.now
+    made.run(27 * MS)
+    out.rewind(at)
+    made.run(100 * MS)
+    assert [level for _, level in changes(made)] == [True, False]
+    assert out.corrections == 1
+
+
+def test_what_has_left_and_is_set_again_alike_stays() -> None:
+    made = bench()
+    out = made.boards.outs["MOV"]
+    at = made.now + 1
+    out.set(True, at)
+    made.run(27 * MS)
+    out.rewind(at - 1)
+    out.set(True, at)
+    made.run(100 * MS)
+    assert [level for _, level in changes(made)] == [True]
+    assert out.corrections == 0
+
+
+def test_what_is_set_otherwise_behind_a_rewind_ends_as_it_was_set() -> None:
+    made = bench()
+    out = made.boards.outs["MOV"]
+    at = made.now
+    out.set(True, at + 1)
+    out.set(False, at + 2 * MS)
+    made.run(29 * MS)
+    out.rewind(at)
+    out.set(True, at + 1 * MS)
+    made.run(100 * MS)
+    assert changes(made)[-1][1] is True
+    assert out.level is True
+
+
+def test_a_late_change_is_made_at_once() -> None:
+    made = bench()
+    at = made.now
+    made.run(80 * MS)
+    made.boards.outs["MOV"].set(True, at)
+    made.run(50 * MS)
+    assert made.machine.outputs["gpio6"] is True
+    assert made.boards.ready
+
+
+def test_now() -> None:
+    made = bench()
+    out = made.boards.outs["MOV"]
+    out.set(True, made.now + 500 * MS)
+    out.now(True)
+    made.run(20 * MS)
+    assert made.machine.outputs["gpio6"] is True
+    out.now(False)
+    made.run(20 * MS)
+    assert made.machine.outputs["gpio6"] is False
+
+
+def test_active_low_outputs_begin_and_fall_as_they_are_set_up() -> None:
+    low = OutSetup("RDY", Pin.parse("!gpio7"), initial=True, off=False)
+    made = bench(outs=(low,))
+    assert made.machine.outputs["gpio7"] is False
+    made.boards.emergency_stop(made.wall)
+    made.run(20 * MS)
+    assert made.machine.outputs["gpio7"] is True
+
+
+def test_many_changes_wait_for_room_in_the_queue() -> None:
+    made = bench(board={"moves": 8})
+    out = made.boards.outs["MOV"]
+    for n in range(60):
+        out.set(n % 2 == 0, made.now + n * MS // 10)
+    made.run(1 * SECOND)
+    assert made.boards.ready
+    assert len(changes(made)) == 60
