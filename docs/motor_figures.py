@@ -10,16 +10,19 @@ import numpy as np
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import parse
+from detent.motors.damping import UNDAMPED, Damping
 from detent.motors.drive import Drive
 from detent.motors.fit import fitted
 from detent.motors.load import Load
 from detent.motors.move import Run, simulate
 from detent.motors.named import CURVES, motor
 from detent.motors.rotor import Rig
-from detent.motors.winding import HALF
+from detent.motors.variants import SPREAD, Ensemble, draws
+from detent.motors.winding import FULL, HALF
 from detent.outputs import motor_figures, rotors
 from detent.outputs.figures import COLOURS, GREY, style
 from detent.pulses import Train
+from detent.ramps.constant_acceleration import move
 from detent.ramps.curves import sine_squared
 from detent.ramps.differences import compiled
 from detent.ramps.table_movement import ramped
@@ -103,6 +106,33 @@ def damping(folder: Path) -> None:
         motor_figures.save(figure, folder / "motor-damping.png")
 
 
+def damping_of_pulses(folder: Path) -> None:
+    """What the assumed damping changes: a slow move, and the resonance of middle speeds."""
+    large = motor("qsh4218-41-10-035")
+    kinds = ((None, COLOURS[0], "0.12, falling with the speed (assumed)"), (UNDAMPED, COLOURS[1], "none"),
+             (Damping(0.12, roll_off=1e6), COLOURS[2], "0.12 at all speeds"))  # fmt: skip
+    with style():
+        figure, panels = motor_figures.blank("Damping about the speed of the pulses", "qsh4218-41-10-035, 24 V", 2)
+        for kind, colour, words in reversed(kinds[:2]):
+            rig = Rig(large, Drive(24, 1.0, FULL), Load(large.rotor), damping=kind)
+            run = simulate(move(100, 400, 50, 300).train, rig, sample=MS // 5)
+            panels[0].plot(run.times * 1e3, run.rotor, color=colour, label=words, linewidth=1.2)
+        panels[0].plot(run.times * 1e3, run.command, color=GREY, linewidth=0.8, label="command")
+        panels[0].set_title("300 full steps, 100 to 400 steps/s", loc="left", fontsize=10)
+        panels[0].legend(frameon=False)
+        motor_figures.dress(panels[0], "time (ms)", "full steps")
+        slews = range(2000, 10_001, 500)
+        for kind, colour, words in kinds:
+            rig = Rig(large, Drive(24, 1.0, HALF, "slow"), Load(large.rotor), damping=kind)
+            some = Ensemble(rig, draws(SPREAD.of(rig), 64))
+            lost = [100 * some.judge(move(1000, top, 600, 6000).train).lost.mean() for top in slews]
+            panels[1].plot(slews, lost, "o-", color=colour, markersize=3.5, label=words)
+        panels[1].set_title("6000 half steps, slow decay: how many of 64 variants lose steps", loc="left", fontsize=10)
+        panels[1].legend(frameon=False, loc="center right")
+        motor_figures.dress(panels[1], "slew speed (half steps/s)", "lost (%)")
+        motor_figures.save(figure, folder / "motor-pulse-damping.png")
+
+
 def critical_region(folder: Path) -> None:
     """Speed and load angle of the SUPERSIGMA ramp, the corner shaded."""
     loaded = replace(big_rig(160), load=Load(inertia=1e-3, viscous=5e-3))
@@ -126,7 +156,7 @@ def critical_region(folder: Path) -> None:
 
 def main(folder: Path) -> None:
     """All pictures."""
-    for draw in (torque_curve, closed_loop, damping, critical_region):
+    for draw in (torque_curve, closed_loop, damping, damping_of_pulses, critical_region):
         draw(folder)
 
 

@@ -39,7 +39,7 @@ def write_curve(
             axes.plot(*zip(*measured.points, strict=True), "o", color=PHASE_B, markersize=5,
                       label=f"published: {measured.supply:g} V, {measured.current:g} A")  # fmt: skip
         axes.axhline(motor.holding_torque, color=PALE, linestyle="--", linewidth=0.9)
-        axes.set_ylim(bottom=0)
+        axes.set_ylim(0, 1.2 * motor.holding_torque)
         axes.set_xlim(left=0)
         dress(axes, f"{drive.winding.name} steps/s", "torque (Nm)")
         axes.legend(frameon=False, loc="upper right")
