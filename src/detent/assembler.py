@@ -16,9 +16,10 @@ import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final, Generic, NamedTuple, Protocol, TypeVar
+from typing import Final, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 Ins = TypeVar("Ins")  # an instruction of the language, whatever it is
+Out = TypeVar("Out", covariant=True)
 
 NAME: Final = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _LABEL: Final = re.compile(r"\s*([^\s:]+)\s*:")
@@ -95,6 +96,15 @@ class Language(Protocol[Ins]):
 
     def spell(self, instruction: Ins, label: str | None = None) -> str:
         """The command in source, as the controller lists it; with `label` in place of its address."""
+
+
+@runtime_checkable
+class Ended(Protocol[Out]):
+    """What a language has besides in which a jump must lead to an instruction, and none of these ends a program."""
+
+    @property
+    def ending(self) -> Out | None:
+        """What does nothing behind the last instruction: put there for a label that stands there and is jumped to."""
 
 
 class SourceError(NamedTuple):
@@ -213,6 +223,7 @@ class _Assembler(Generic[Ins]):
         """Both passes. Raises AssemblyFailed."""
         for number, line in enumerate(self.lines, start=1):
             self.read(number, line.partition(self.language.comment)[0])
+        self.end()
         self.report_overflow()
         aimed = [self.aim(line) for line in self.found]
         if self.errors:
@@ -289,6 +300,17 @@ class _Assembler(Generic[Ins]):
         self.taken.update(dict.fromkeys(range(line.address, self.address), line))
         if self.area is not None and self.address > self.area.stop and self.overflow is None:
             self.overflow = line, self.area
+
+    def end(self) -> None:
+        """A label behind the last instruction to which a jump leads gets an instruction of its own."""
+        ending = self.language.ending if isinstance(self.language, Ended) else None
+        led = {line.statement.label for line in self.found}
+        label = next((label for label in self.pending if label in led), None)
+        if label is None or ending is None:
+            return
+        number = self.defined[label]
+        column = self.lines[number - 1].index(label) + 1
+        self.place(_Line(number, column, self.address, Statement(ending), ending, self.language.length(ending)))
 
     def report_overflow(self) -> None:
         """Say by how much the part that ends here is too long, at the first instruction that does not fit."""

@@ -90,7 +90,7 @@ def test_points_come_from_a_file(tmp_path: Path, capsys: Capture) -> None:
         (("linear", "--duration", "0"), "--duration: a ramp takes some time"),
         (("liner",), "no curve 'liner'; did you mean linear?"),
         (("nothing.csv",), "nothing.csv: cannot read it: No such file"),
-        (("--at", "65500"), "does not fit 16 bits of address"),
+        (("--at", "1024"), "--at 1024: 232 bytes do not fit there in the 1024 of an 8748; say 0 to 792"),
         (("--peak", "nan"), "the speed is nan"),
     ],
 )

@@ -68,7 +68,7 @@ def table(
     """
     from detent.cli.target import asked_wrongly, failed
     from detent.outputs.files import write_whole
-    from detent.ramps.differences import CurveError, compiled
+    from detent.ramps.differences import EPROM, CurveError, compiled
     from detent.ramps.hex_records import intel_hex
 
     try:
@@ -79,6 +79,11 @@ def table(
             made = compiled(law, seconds, clocks)
         except CurveError as error:
             raise CurveError(f"{name}: {error}") from None
+        if not 0 <= at <= EPROM - len(made.differences):
+            raise ValueError(
+                f"--at {at}: {len(made.differences)} bytes do not fit there in the {EPROM} of an 8748; "
+                f"say 0 to {EPROM - len(made.differences)}, or leave it out for {PAGE_3}"
+            )
         records = intel_hex(made.differences, at)
     except (ValueError, OSError) as error:
         asked_wrongly(error)

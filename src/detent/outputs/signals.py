@@ -45,11 +45,24 @@ class Pulses(NamedTuple):
 def of_cell(cell: Cell, shafts: Mapping[str, int] | None = None) -> "Signals":
     """What happened in a cell up to now. `shafts` are the places where axes stood at the start, if not at 0.
 
-    ValueError for a cell that was told not to record.
+    Where nothing is left to do the end of the last pulse belongs to it. ValueError for a cell that was told not to
+    record.
     """
     if cell.recording is None:
         raise ValueError("this cell keeps no recording: build it with record=True")
-    return Signals(cell.recording, views(cell, shafts), cell.now)
+    seen = views(cell, shafts)
+    until = cell.now
+    if cell.next_event() is None:
+        until = max(until, *(_last_edge(cell.recording, view, cell.now) for view in seen))
+    return Signals(cell.recording, seen, until)
+
+
+def _last_edge(recording: Recording, view: UnitView, now: Ns) -> Ns:
+    """When the last step pulse of a unit ends; 0 if it gave none."""
+    if view.pulse_output is None:
+        return 0
+    spans = [span for axis in view.axes for span in recording.motion(view.name, now, axis) if span.last >= span.first]
+    return max((span.train.time_of(span.last) + view.pulse_output.width for span in spans), default=0)
 
 
 class Signals:

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from detent.assembler import Assembly, AssemblyFailed, assemble, disassemble, listing
 from detent.controllers.gsc200.arguments import Condition, Direction, Number, Signed
 from detent.controllers.gsc200.commands import Instruction, Row, rows
+from detent.controllers.gsc200.firmware import GsC200
 from detent.controllers.gsc200.program import CAPACITY, empty, from_image, from_instructions, language
+from detent.uart import Char, Sent
 
 C200, C200S = "gs-c200", "gs-c200s"
 
@@ -129,13 +131,31 @@ def test_a_command_of_the_other_model_is_named_as_such() -> None:
 
 def test_jumps_must_end_at_an_instruction() -> None:
     """Command description, last page: "it is mandatory to address the proper memory position"."""
-    assert complaints(C200S, "S10", "j 1", "j 99", "j end", "end: ; nothing") == [
+    assert complaints(C200S, "S10", "j 1", "j 99") == [
         (2, 1, "address 1 lies inside the instruction of line 1, which takes bytes 0 to 3; "
                "jump to 0 or use a label"),
-        (3, 1, "no instruction starts at address 99: the program ends at 9"),
-        (4, 3, "label end stands behind the last instruction, where there is nothing to jump to; "
-               "put an instruction behind it"),
+        (3, 1, "no instruction starts at address 99: the program ends at 7"),
     ]  # fmt: skip
+
+
+def test_a_label_behind_the_last_instruction_is_the_end_of_the_program() -> None:
+    """The same: a jump must lead to an instruction, and there is none that stops. `L1` there does nothing."""
+    menu = built(C200S, "jc7,end", "+50", "j end", "+9", "end:", "done: ; nobody jumps here")
+    assert menu.commands == ("jc7,12", "+50", "j12", "+9", "L1")
+    assert [(placed.line, placed.address) for placed in menu.placed][-1] == (5, 12)
+    assert built(C200S, "+50", "end:").commands == ("+50",)
+    program = from_image(C200S, menu.image)
+    unit = GsC200(C200S, {"CHS": 0}, line_timing=False)
+    unit.power(True, 0)
+    unit.load(program.image(), 0, 0)
+    for begin, level, position in ((10**9, 1, 0), (11 * 10**9, 0, 50)):
+        end = begin + 4 * 10**9
+        unit.set_pin("UI1", level, begin)
+        unit.start(begin)
+        unit.advance(end)
+        unit.receive("RXD", [Char(value) for value in b"F\r"], end)
+        assert unit.status(end).position == position
+        assert unit.answers(bytes(item.char.value for item in unit.drain() if isinstance(item, Sent)))[-1] == "R"
 
 
 def test_a_program_too_long_says_by_how_much_and_from_which_line() -> None:

@@ -195,6 +195,15 @@ class SimpleLanguage:
     blank: int = 0
     closed: bool = True
 
+    @property
+    def ending(self) -> Instruction | None:
+        """L1 runs what is before it once in all: nothing happens, and the program ends behind it.
+
+        There is no instruction that stops a program, and a jump must lead to one ("it is mandatory to address the
+        proper memory position").
+        """
+        return Instruction(Op.LOOP, 1) if self.model == commands.GS_C200S else None
+
     def parse(self, text: str) -> Statement[Instruction]:
         """The instruction in `text`; see `detent.assembler.Language`."""
         text = _capital(text)
