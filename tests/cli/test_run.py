@@ -259,6 +259,25 @@ def test_a_refused_line_that_was_sent_ends_with_status_1(capsys: pytest.CaptureF
     assert "gs-c200 refused 'A9'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("tokens", "message"),
+    [
+        (("supersigma", "--send", "limit +90 3"),
+         "supersigma obeys 'limit +90 3' at 250 us: 300 half steps/s is below 650"),
+        (("gs-c200", "--send", "H-", "--send", "@ 255ms", "--send", "K", "--send", "G0", "--for", "1"),
+         "gs-c200 obeys 'G0' at 274.5 ms: a homing that was cut off has taken the counter below 0"),
+    ],
+)  # fmt: skip
+def test_a_line_that_does_what_may_not_be_expected_is_told(
+    tokens: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert detent("run", *tokens) == 0
+    assert f"detent: {message}" in capsys.readouterr().err
+    assert detent("run", *tokens, "--json") == 0
+    (caution,) = json.loads(capsys.readouterr().out)["cautions"]
+    assert caution["what"] in message or message.partition(": ")[2] in caution["what"]
+
+
 def test_a_motor_that_loses_steps_is_told_and_ends_with_status_1(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A start at 2000 steps/s against a heavy load."""
     arm.write_text(

@@ -10,7 +10,7 @@ from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
 from detent.cell.recording import Entry, Recording
 from detent.controllers import catalogue
-from detent.controllers.device import Controller, Refused
+from detent.controllers.device import Cautioned, Controller, Refused
 from detent.ticks import Ns
 
 MOST_HEARD = 1 << 20  # characters kept of what came back for one line
@@ -57,6 +57,8 @@ class Witness(Recording):
                 self.moving.pop((unit, entry.axis), None)  # type: ignore[union-attr]
             elif kind is Refused:
                 self._conversation.note_refusal(unit, entry)  # type: ignore[arg-type]
+            elif kind is Cautioned:
+                self._conversation.note_caution(unit, entry)  # type: ignore[arg-type]
 
 
 class Conversation:
@@ -66,6 +68,7 @@ class Conversation:
         self.exchanges: list[Exchange] = []
         self.refused: list[tuple[str, Refused, Exchange | None]] = []  # the unit, and the line that it belongs to
         self.unasked: dict[int, bytearray] = {}  # by line: what was heard before anybody had said anything there
+        self.cautions: list[tuple[str, Cautioned]] = []  # the unit, and what it does that may not be expected
         self.scripted = True  # whether what is typed now comes from the cell's script
         self._cell: Cell | None = None
         self._of_line: dict[int, list[Exchange]] = {}  # those that may still be answered
@@ -137,6 +140,11 @@ class Conversation:
         self.refused.append((cell.wiring.names[unit], refused, found))
         if found is not None:
             found.refused.append(refused)
+
+    def note_caution(self, unit: int, caution: Cautioned) -> None:
+        """A unit obeys a line in a way that may not be expected."""
+        if self._cell is not None and len(self.cautions) < MOST_REFUSED:
+            self.cautions.append((self._cell.wiring.names[unit], caution))
 
     def _close(self, number: int) -> None:
         """The last line that was sent there: when it is over, as long as no other follows it."""

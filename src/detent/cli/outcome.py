@@ -105,6 +105,11 @@ def facts(told: Outcome) -> dict[str, object]:
         result["script"] = [
             {"at_ns": one.at, "unit": one.unit, "sent": one.sent, "answers": answers(one)} for one in told.scripted
         ]
+    if told.conversation.cautions:
+        result["cautions"] = [
+            {"at_ns": caution.at, "unit": unit, "line": caution.frame, "what": caution.what}
+            for unit, caution in told.conversation.cautions
+        ]
     if told.refused:
         result["refused"] = [
             {"at_ns": refused.at, "unit": unit, "line": refused.frame if line is None else line.sent,
@@ -208,6 +213,8 @@ def warn(told: Outcome) -> None:
     """What went wrong, a line each on stderr."""
     from detent.ticks import show_duration
 
+    for unit, caution in told.conversation.cautions[:MOST_SHOWN]:
+        _warn(f"{unit} obeys {caution.frame!r} at {show_duration(caution.at)}: {caution.what}")
     for unit, refused, line in told.refused[:MOST_SHOWN]:
         answers = [] if line is None else told.conversation.answers(line)
         answered = f"; it answered {' '.join(answers)}" if answers else "; it answered nothing"

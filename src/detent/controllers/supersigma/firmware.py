@@ -274,7 +274,7 @@ class Supersigma:
 
     def _caution(self, command: Command) -> str:
         """What is unexpected of a command that is taken: a limit that the ramps of the table cannot keep."""
-        limit, lowest = command.speed * commands.SPEED_UNIT, CLOCK_HZ // (self._motion.lowest + 1)
+        limit, lowest = command.speed * commands.SPEED_UNIT, round(CLOCK_HZ / (self._motion.lowest + 1))
         if command.op is not Op.LIMIT or limit >= lowest:
             return ""
         return (
