@@ -139,6 +139,9 @@ def _print(verb: str, answer: dict[str, Any]) -> None:
     from rich.console import Console
 
     console = Console(highlight=False)
+    if "axes" in answer:
+        _print_real(console, answer)
+        return
     if "units" in answer:
         if answer.get("reached") is False:
             console.print("It has not come to that in time.\n")
@@ -191,8 +194,25 @@ def _print_state(console: "Console", answer: dict[str, Any]) -> None:
     for name, motor in answer["motors"].items():
         console.print(f"motor {name}: at {motor['place']:.3f}, wanted at {motor['command']:.3f}, "
                       f"{motor['rad_per_s']:.3g} rad/s", markup=False)  # fmt: skip
+    if "real" in answer:
+        _print_real(console, answer["real"])
     if answer["faults"]:
         _print_faults(console, answer["faults"])
+
+
+def _print_real(console: "Console", real: dict[str, Any]) -> None:
+    """How real pins stand."""
+    rows = []
+    for name, axis in real["axes"].items():
+        standing = axis["standing"] if not axis["why"] else f"{axis['standing']}: {axis['why']}"
+        rows.append([name, standing, axis["shaft"], "" if axis["known"] else "not known", axis["stops"], axis["slips"],
+                     f"{axis['lead'] / 1e6:g} ms", f"{axis['lag'] / 1e6:.3g} ms", _listed(axis["armed"])])  # fmt: skip
+    columns = ["axis", "standing", "steps", "motor", "stops", "slips", "lead", "lag", "stopped by"]
+    console.print(_table("real pins", columns, rows))
+    boards = ([name, b["state"], b["firmware"], b["frequency"], b["move_count"]] for name, b in real["boards"].items())
+    console.print(_table("boards", ["board", "state", "firmware", "ticks/s", "queue"], boards))
+    if real.get("waits_for"):
+        console.print(f"waiting for the boards of {_listed(real['waits_for'])}", markup=False)
 
 
 def _print_faults(console: "Console", faults: Sequence[dict[str, Any]]) -> None:

@@ -14,6 +14,7 @@ from cyclopts import Parameter
 if TYPE_CHECKING:
     from detent.cell.cell import Cell
     from detent.cell.description import Description
+    from detent.realtime.boards.drive import RealPins
     from detent.realtime.endpoints.tcp import TcpAddress
     from detent.realtime.endpoints.wanted import Wanted
     from detent.realtime.service import Served, Service
@@ -34,6 +35,8 @@ def serve(
     state: Path | None = None,
     control: str | None = None,
     token: str | None = None,
+    real: Annotated[bool, Parameter(negative=())] = False,
+    realtime: Annotated[bool, Parameter(negative=())] = False,
     json: bool = False,
 ) -> None:
     """Serve a controller or a cell in real time, until Ctrl-C.
@@ -69,6 +72,10 @@ def serve(
         Listen on HOST:PORT for who looks and meddles, see `detent control`. Port 0: any free port.
     token
         What those have to know, where it is not this computer alone that can ask; $DETENT_TOKEN without it.
+    real
+        Drive the pins of the boards in the cell file: steps, outputs and inputs of [boards] and [hardware].
+    realtime
+        Take real-time priority, so that a busy computer makes no step late.
     json
         Print one line of JSON once everything is open, and nothing else.
     """
@@ -76,6 +83,7 @@ def serve(
     from detent.cli import FAILED
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
+    from detent.realtime.boards.drive import take_priority
     from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost
     from detent.realtime.images import Images, ImagesUnusable, default_folder
     from detent.realtime.service import Service, models
@@ -90,6 +98,8 @@ def serve(
             raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
         wanted = asked_endpoints(links, tcp, rfc2217, serial)
         control_at = None if control is None else _address("--control", control)
+        if real and pace != 1:
+            raise Problem("", "--pace", "real pins keep real time: leave it out with --real")
         found = find(target, straps=strap, options=set_, pins=pin)
         folder = state if state is not None else default_folder()
         images = Images.of(folder, target, models(found.description), is_file=bool(found.description.file))
@@ -97,8 +107,10 @@ def serve(
         asked_wrongly(error)
     try:
         try:
+            pins = _real_pins() if real else None
             service = Service(found.description, found.read, wanted, pace=pace, line_timing=line_timing,
-                              images=images, observed=control_at is not None, on_stop=_tell_stop)  # fmt: skip
+                              images=images, observed=control_at is not None, on_stop=_tell_stop,
+                              real=pins)  # fmt: skip
             url = _control(service, control_at, token)
         except (Problem, EndpointError) as error:
             asked_wrongly(error)
@@ -108,8 +120,11 @@ def serve(
         with service, service.stopped_by_signals():
             for report in service.reports:
                 print(f"detent: {report}", file=sys.stderr)
+            refused = take_priority() if realtime else ""
+            if refused:
+                print(f"detent: {refused}", file=sys.stderr)
             if json:
-                print(json_text.dumps(_facts(service.endpoints, url)), flush=True)
+                print(json_text.dumps(_facts(service, url)), flush=True)
             else:
                 _print_ready(service, found.description, folder, pace, url)
             gc.freeze()  # what is there now stays: no collection shall look at it while a deadline waits
@@ -175,12 +190,27 @@ def _control(service: "Service", address: "TcpAddress | None", token: str | None
     return http.url
 
 
-def _facts(endpoints: "Sequence[Served]", control: str | None) -> dict[str, object]:
+def _real_pins() -> "RealPins":
+    """What people should know of real pins is a line on stderr, with the time of the cell."""
+    from detent.realtime.boards.drive import RealPins
+    from detent.realtime.boards.states import News
+
+    def tell(news: News) -> None:
+        print(f"detent: {news.at / 1e9:.3f} s: {news.weight.value}: {news.text}", file=sys.stderr, flush=True)
+
+    return RealPins(tell)
+
+
+def _facts(service: "Service", control: str | None) -> dict[str, object]:
     """What `--json` tells."""
-    return {
-        "endpoints": [{"unit": e.unit, "kind": e.kind, "address": e.address} for e in endpoints],
+    told: dict[str, object] = {
+        "endpoints": [{"unit": e.unit, "kind": e.kind, "address": e.address} for e in service.endpoints],
         "control": control,
     }
+    if service.driven is not None:
+        told["boards"] = [state._asdict() for state in service.driven.board_states()]
+        told["axes"] = [axle.name for axle in service.driven.axles]
+    return told
 
 
 def _print_ready(
@@ -191,6 +221,11 @@ def _print_ready(
     print(f"Serving {', '.join(description.units)} in {speed}; EEPROM images in {folder}")
     for unit, line in _straps(description, service.cell):
         print(f"  {unit}: {line}")
+    if service.driven is not None:
+        for state in service.driven.board_states():
+            axes = ", ".join(axle.name for axle in service.driven.axles if axle.what.board == state.board)
+            lead = service.driven.plan.lead / 1e6
+            print(f"Real pins of {state.board} ({state.firmware}): {axes or 'no axis'}; {lead:g} ms behind")
     print("Connect:")
     width = max(len(endpoint.unit) for endpoint in service.endpoints)
     commands = [(endpoint, _command(endpoint)) for endpoint in service.endpoints]

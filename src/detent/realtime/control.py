@@ -14,10 +14,12 @@ from detent.cell.deeds import Action
 from detent.lines.faults import BitErrors, CableOut, Delay, LineFault, LostCharacters
 from detent.pins import LOW
 from detent.realtime import verbs
-from detent.realtime.picture import as_json, level_of, pins_of, switches_of, time_of, whole_state
+from detent.realtime.boards.driven import Driven
+from detent.realtime.picture import as_json, level_of, pins_of, real_state, switches_of, time_of, whole_state
 from detent.realtime.service import Service
 from detent.realtime.verbs import Answer, AskedWrongly, Json
 from detent.realtime.waiting import Condition, at_position, at_time
+from detent.realtime.watch import Watch
 from detent.ticks import SECOND
 
 PATIENCE: Final = 60.0  # seconds of the wall clock that `wait` and `run-for` wait
@@ -38,7 +40,7 @@ class Control:
         if service.watched is None or service.watch is None:
             raise ValueError("the service keeps no watch: make it with observed=True")
         self._service, self._cell, self._pace = service, service.cell, service.pace
-        self._watched, self._watch = service.watched, service.watch
+        self._watched = service.watched
         self._lock = threading.Lock()  # over the two that follow
         self._ended = False
         self._waited_for: set[Future[Answer]] = set()
@@ -61,6 +63,9 @@ class Control:
             "faults": self._faults,
             "fault": self._fault,
             "mend": self._mend,
+            "stop": self._emergency_stop,
+            "recover": self._recover,
+            "board": self._boards,
         }
 
     def do(self, verb: str, given: Mapping[str, object]) -> Answer | Future[Answer]:
@@ -69,6 +74,7 @@ class Control:
         The answer of `wait` and `run-for` is to come: cancel it to wait no longer.
         """
         arguments = verbs.verb(verb).read(given)
+        self._refuse_on_real_pins(verb, arguments)
         try:
             answer = self._does[verb](arguments)
         except (ValueError, KeyError) as error:
@@ -193,6 +199,45 @@ class Control:
                 return {"kind": "eeprom", "where": unit, "times": times}
             case SupplyDip(unit):
                 return {"kind": "dip", "where": unit}
+
+    # -- real pins ---------------------------------------------------------------------------------------
+
+    def _watch(self) -> Watch:
+        watch = self._service.watch
+        assert watch is not None
+        return watch
+
+    def _refuse_on_real_pins(self, verb: str, given: Given) -> None:
+        """What a motor cannot follow, or what would make the cell blind to a switch of the machine."""
+        driven = self._service.driven
+        if driven is None:
+            return
+        if verb in ("pause", "resume", "step", "run-for", "pace") or (verb == "wait" and given.get("pause")):
+            raise AskedWrongly("real pins are driven, and their time does not stand", "stop the motors with stop")
+        if verb in ("set", "release", "fault"):
+            where = str(given["where"] if verb == "fault" else given["pin"])
+            unit, dot, pin = where.partition(".")
+            if not dot:
+                unit, pin = str(given.get("unit", next(iter(self._cell.controllers()), ""))), where
+            if (unit, pin) in driven.plan.inputs.values():
+                raise AskedWrongly(f"{unit}.{pin} is an input of a board", "its level is that of the pin")
+
+    def _driven(self) -> Driven:
+        driven = self._service.driven
+        if driven is None:
+            raise AskedWrongly("no real pins are driven", "serve the cell with --real")
+        return driven
+
+    def _emergency_stop(self, _: Given) -> Answer:
+        self._driven().stop()
+        return self._boards({})
+
+    def _recover(self, _: Given) -> Answer:
+        waits = self._driven().recover()
+        return {"waits_for": waits, **self._boards({})}
+
+    def _boards(self, _: Given) -> Answer:
+        return {"time_ns": self._cell.now, **real_state(self._driven())}
 
     # -- hands -------------------------------------------------------------------------------------------
 

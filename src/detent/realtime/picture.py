@@ -9,6 +9,7 @@ from detent.cell.mechanics import Mechanics
 from detent.cell.switches import Switch
 from detent.controllers.device import Powered, Refused
 from detent.pins import Level, Pin
+from detent.realtime.boards.driven import Driven
 from detent.realtime.service import Service
 from detent.realtime.verbs import Answer, Json
 from detent.realtime.watch import Event, Watch
@@ -38,7 +39,18 @@ def whole_state(service: Service) -> Answer:
             cell.wiring.names[n]: _motor(cell, part) for n, part in enumerate(cell.parts) if isinstance(part, Mechanics)
         },
         "events": _events(service),
+        **({} if service.driven is None else {"real": real_state(service.driven)}),
     }
+
+
+def real_state(driven: Driven) -> Answer:
+    """How the axes with real pins stand, and their boards."""
+    axes: dict[str, Json] = {}
+    for state in driven.axes():
+        told = as_json(state._replace(standing=state.standing.value))  # type: ignore[arg-type]
+        axes[f"{state.unit}.{state.axis}" if state.axis else state.unit] = told
+    boards: dict[str, Json] = {state.board: as_json(state) for state in driven.board_states()}
+    return {"axes": axes, "boards": boards, "escaped": driven.escaped, "stops": driven.rewinds}
 
 
 def unit_state(service: Service, name: str) -> Answer:

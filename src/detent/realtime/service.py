@@ -1,6 +1,7 @@
 """A cell with everything it needs to be served: its endpoints opened, its images in possession, its loop."""
 
 import contextlib
+import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
@@ -13,6 +14,10 @@ from detent.cell.delivery import Oscillation, Store, no_store
 from detent.cell.description import Description, Problem
 from detent.cell.mechanics import Mechanics
 from detent.motors.motor import MotorError
+from detent.pins import Level
+from detent.realtime.boards.drive import Opened, RealPins
+from detent.realtime.boards.driven import Driven
+from detent.realtime.boards.replies import HeldStores
 from detent.realtime.endpoints.endpoint import Endpoint
 from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.guarded import Guarded
@@ -49,35 +54,60 @@ class Service:
         images: Images | None = None,
         observed: bool = False,
         on_stop: Callable[[str], None] = lambda why: None,
+        real: RealPins | None = None,
     ) -> None:
         """Build the cell and open what is `wanted` for every line; nothing: what the cell file says, or a pty.
 
         `images` stay their owner's. One that is `observed` can be looked at and meddled with (`realtime.control`).
-        `on_stop` is told when the cell cannot go on; it is served all the same.
-        Raises Problem, EndpointError, ValueError.
+        `on_stop` is told when the cell cannot go on; it is served all the same. With `real` it drives the boards of its
+        cell file. Raises Problem, EndpointError, ValueError.
         """
         self.description = description
+        self.driven: Driven | None = None
         self.reports: list[str] = []  # about images that could not be used
         if wanted and any(w.kind == "serial" for w in wanted):
             line_timing = False  # the wire outside takes the time
-        self.cell = build_with_images(description, read, images, line_timing, self.reports, observed)
-        self.watch = _watch(self.cell) if observed else None
+        if real is not None and pace != 1:
+            raise Problem("", "pace", "real pins keep real time: leave the pace at 1")
         self._company = contextlib.ExitStack()
         self._cleanup = contextlib.ExitStack()
         with contextlib.ExitStack() as opening:
+            stores, inputs, opened = None, None, None
+            if real is not None:
+                opened = Opened(description, read, real)
+                opening.callback(opened.boards.close)
+                stores, inputs = HeldStores(no_store if images is None else images.save), opened.inputs
+            self.cell = build_with_images(
+                description, read, images, line_timing, self.reports, observed or real is not None,
+                None if stores is None else stores.save, inputs,
+            )  # fmt: skip
+            self._observed = observed
+            if observed:
+                _watch(self.cell, passes_on=real is not None)
+            if opened is not None and stores is not None:
+                self.driven = opened.drive(self.cell, stores)
+                opening.callback(self.driven.close)
+            self._to_begin = opened
             self._opened = open_endpoints(description, self.cell, wanted, opening)
             self.endpoints = [
                 Served(self._title(number), endpoint.kind, endpoint.address, self.cell.lines[number].format)
                 for number, endpoint in self._opened
             ]
-            self.pace = Pace(pace, origin=self.cell.now)
+            clock = time.monotonic_ns if self.driven is None else self.driven.clock
+            self.pace = Pace(pace, origin=self.cell.now, clock=clock)
             patience = [line.format.duration(BEHIND) for line in self.cell.lines]
-            self.watched = Watched(self.cell, self.pace) if observed else None
-            self.guarded = Guarded(self.watched or self.cell, self._stopped)
+            self.watched = Watched(self.driven or self.cell, self.pace) if observed else None
+            self.guarded = Guarded(self.watched or self.driven or self.cell, self._stopped)
             self._on_stop = on_stop
-            self._loop = Loop(self.guarded, self.pace, self._opened, patience=patience)
+            self._loop = Loop(self.guarded, self.pace, self._opened, patience=patience, companion=self.driven)
             opening.callback(self._loop.close)
             self._cleanup = opening.pop_all()
+
+    @property
+    def watch(self) -> Watch | None:
+        """How the units stand, of one that is observed. A cell that is taken back takes it along: ask each time."""
+        recording = self.cell.recording
+        return recording if self._observed and isinstance(recording, Watch) else None
 
     def ask(self, function: Callable[[], T]) -> "Future[T]":
         """Call `function` soon on the thread that serves; from any thread. Cancelled when the service is closed."""
@@ -98,6 +128,8 @@ class Service:
     def _stopped(self, why: str) -> None:
         if self.watched is not None:
             self.watched.close()  # nobody waits for what cannot happen
+        if self.driven is not None:
+            self.driven.abandon(why)
         self._on_stop(why)
 
     def ends_with(self, close: Callable[[], None]) -> None:
@@ -110,7 +142,11 @@ class Service:
 
     def restart_clock(self) -> None:
         """The present of the cell is now: what it did before was done in virtual time."""
-        self.pace.restart(self.cell.now)
+        if self.driven is None:
+            self.pace.restart(self.cell.now)
+        elif self._to_begin is not None:
+            self._to_begin.begin(self.driven, self.pace)
+            self._to_begin = None
 
     def run(self) -> None:
         """Serve until `stop`, also one that was called already. Raises EndpointLost."""
@@ -162,9 +198,9 @@ def models(description: Description) -> dict[str, str]:
     return {name: unit.model for name, unit in description.units.items()}
 
 
-def _watch(cell: Cell) -> Watch:
+def _watch(cell: Cell, *, passes_on: bool) -> Watch:
     """A watch in the place of the recording of `cell`. The past is not kept, and of the journal what is recent."""
-    watch = Watch(cell)
+    watch = Watch(cell, passes_on=passes_on)
     cell.recording, cell.journal = watch, Lately()
     for part in cell.parts:
         if isinstance(part, Mechanics):
@@ -215,17 +251,22 @@ def build_with_images(
     reports: list[str],
     record: bool,
     store: Store | None = None,
+    inputs: Mapping[tuple[str, str], Level] | None = None,
 ) -> Cell:
     """The cell with the images that are kept; an image that its controller cannot have written is moved aside."""
     if images is None:
-        return build(description, read, store=store or no_store, record=record, line_timing=line_timing)
+        return build(
+            description, read, store=store or no_store, record=record, line_timing=line_timing, inputs=inputs
+        )  # fmt: skip
     kept: Mapping[str, bytes]
     kept, told = images.load()
     reports += told
     while True:
         try:
             save = store or images.save
-            return build(description, read, images=kept, store=save, record=record, line_timing=line_timing)
+            return build(
+                description, read, images=kept, store=save, record=record, line_timing=line_timing, inputs=inputs
+            )  # fmt: skip
         except Problem as problem:
             unit = problem.key.removeprefix("units.")
             if unit not in kept:

@@ -212,6 +212,10 @@ VERBS: Final[Mapping[str, Verb]] = {
               SEED), placed=2),
         Verb("mend", "A fault is mended, if it is not over already; all of them without a number.",
              (Parameter("fault", NATURAL, "its number"),)),
+        Verb("stop", "Emergency stop of real pins: every board stops at once, and no axis moves until recover."),
+        Verb("recover", "Real pins that stand go on from where the boards have counted their motors."),
+        Verb("board", "How real pins stand: axes, counts, slips, lead and lag, what would stop them; their boards.",
+             changes=False),
     )
 }  # fmt: skip
 """Every verb by name, in the order in which they are shown."""

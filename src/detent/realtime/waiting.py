@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from typing import NamedTuple
 
 from detent.cell.cell import Cell
-from detent.lines.line import Line
+from detent.realtime.loop import Served, ServedLine
 from detent.realtime.pace import Pace
 from detent.realtime.verbs import Answer
 from detent.realtime.watch import Watch
@@ -43,7 +43,7 @@ class _Waiter(NamedTuple):
 class Watched:
     """The cell as the loop serves it. It stands when its pace is held, also in the middle of catching up."""
 
-    def __init__(self, cell: Cell, pace: Pace) -> None:
+    def __init__(self, cell: Served, pace: Pace) -> None:
         self.cell, self._pace = cell, pace
         self._waiters: list[_Waiter] = []
 
@@ -53,7 +53,7 @@ class Watched:
         return self.cell.now
 
     @property
-    def lines(self) -> Sequence[Line]:
+    def lines(self) -> Sequence[ServedLine]:
         """Its lines."""
         return self.cell.lines
 
@@ -106,15 +106,14 @@ class Watched:
         self._waiters = []
 
 
-def at_position(cell: Cell, watch: Watch, unit: str, axis: str, position: int) -> Condition:
+def at_position(cell: Cell, watch: Callable[[], Watch], unit: str, axis: str, position: int) -> Condition:
     """The axis of a unit is at a position. The pulse that brings it there is an instant to look at."""
-    controller, travel = cell.controller(unit), watch.of_unit[cell.unit(unit)].front.travels[axis]
 
     def holds() -> bool:
-        return controller.status(cell.now, axis).position == position
+        return cell.controller(unit).status(cell.now, axis).position == position
 
     def following() -> Ns:
-        motion = travel.motion
+        controller, motion = cell.controller(unit), watch().of_unit[cell.unit(unit)].front.travels[axis].motion
         if motion is None:
             return NEVER
         missing = (position - controller.status(cell.now, axis).position) * motion.direction

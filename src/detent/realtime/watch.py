@@ -50,13 +50,17 @@ class UnitWatch:
 class Watch(Recording):
     """How each unit of `cell` stands. It goes on from the recording of the cell, of which it keeps nothing else."""
 
-    __slots__ = ("events", "of_unit")
+    __slots__ = ("_passes_on", "events", "of_unit")
 
-    def __init__(self, cell: Cell) -> None:
-        """ValueError for a cell that does not record."""
+    def __init__(self, cell: Cell, *, passes_on: bool = False) -> None:
+        """One that `passes_on` keeps what it was told for somebody who will `take` it.
+
+        ValueError for a cell that does not record.
+        """
         if cell.recording is None:
             raise ValueError("this cell keeps no recording to go on from: build it with record=True")
         super().__init__(cell.recording.units)
+        self._passes_on = passes_on
         self.of_unit = [UnitWatch(front) for front in Panel(cell, {}).fronts]
         self.events: deque[tuple[int, Event]] = deque(maxlen=MOST_EVENTS)  # the unit, and what it was
         for unit, entry in cell.recording:
@@ -64,6 +68,8 @@ class Watch(Recording):
 
     def extend(self, unit: int, entries: Sequence[Entry]) -> None:
         """Take note of what one unit did."""
+        if self._passes_on:
+            super().extend(unit, entries)
         watched = self.of_unit[unit]
         for entry in entries:
             if watched.tell(entry):

@@ -85,6 +85,8 @@ class Driven:
             Axle(what, boards.steppers[what.stepper], Guard(boards.stops[what.stepper]), what.shaft)
             for what in plan.axes
         ]
+        for owner, pin in plan.outs:
+            cell.parts[cell.unit(owner)].watch(pin)  # of a winding, or of a pulse, every level is told
         self._by_stepper = {axle.name: axle for axle in self.axles}
         self._of_unit: dict[int, list[Axle]] = {}
         for axle in self.axles:
@@ -103,6 +105,8 @@ class Driven:
         self._pending = True  # something was told that no commit has followed
         self._stages: dict[str, Stage] = {}
         self._half: dict[str, tuple[bool, Ns]] = {}
+        self.on_moving: Callable[[bool], None] = lambda moving: None  # something begins to move, or all is at rest
+        self._was_moving = False
         self.escaped = 0  # characters that hosts heard though they were taken back
         self.rewinds = 0
         self.longest_rewind: WallNs = 0
@@ -208,6 +212,10 @@ class Driven:
                 self._happened(event)
         self._stores.flush(self._horizon())
         self._forget()
+        moving = any(axle.motion is not None for axle in self.axles)
+        if moving is not self._was_moving:
+            self._was_moving = moving
+            self.on_moving(moving)
 
     def commit(self) -> None:
         """Give the boards what is certain, at once."""
@@ -665,6 +673,16 @@ class Driven:
     def _not_written(self, unit: str) -> None:
         what = f"the memory of {unit} could not be written, after it had answered that it was"
         self._say(Weight.WARNING, f"{what}: at the next start it has what it kept before")
+
+    def close(self) -> None:
+        """Let go: what is certain is stored, drivers are switched off, and no step comes any more."""
+        self._stores.flush(NEVER)
+        for axle in self.axles:
+            if axle.what.enable:
+                self.boards.outs[axle.what.enable].now(False)
+        self.boards.commit(self.cell.now, self._wall())
+        self.boards.close()
+        self.on_moving(False)
 
     # -- looking -----------------------------------------------------------------------------------------
 
