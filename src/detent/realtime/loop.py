@@ -215,6 +215,7 @@ class Loop:
             if reader is None:
                 os.read(self._woken, 64)
                 self._do_asked()
+                cell.run_to(cell.now)  # whoever stands between takes note of what was done to it
                 continue
             line, endpoint = reader
             data = endpoint.receive(descriptor, wall)

@@ -132,6 +132,12 @@ class Bench:
         self.loop._catch_up()
         self.driven.send(self.cell.wiring.line_of[self.cell.unit(unit)], data)
 
+    def power(self, unit: str, on: bool) -> None:
+        """A hand switches a unit, now."""
+        self.loop.ask(lambda: self.cell.power(unit, on))
+        self.loop._do_asked()
+        self.driven.run_to(self.driven.now)
+
     def said(self, unit: str) -> str:
         line = self.cell.wiring.line_of[self.cell.unit(unit)]
         return "".join(chr(value & 127) for _, _, value in self.heard[line])

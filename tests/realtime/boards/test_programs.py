@@ -140,11 +140,11 @@ def run(model: str, seed: int) -> int:
         for _ in range(random.randrange(2, 12)):
             bench.run(random.choice([2 * MS, 15 * MS, 90 * MS, 400 * MS]) + random.randrange(MS))
             if random.random() < 0.04:
-                bench.cell.power("x", random.random() < 0.5)
+                bench.power("x", random.random() < 0.5)
             else:
                 typed(bench, model, random.choice(lines), random)
         bench.run(200 * MS)
-        bench.cell.power("x", True)
+        bench.power("x", True)
         for stop in {"gs-c200s": ["K"], "separate clocks": ["K"], "dcb-274": ["\x1b"], "bs0610": ["!"],
                      "supersigma": []}[model]:  # fmt: skip
             typed(bench, model, stop, random)

@@ -1,7 +1,7 @@
 """Stops in the firmware take the cell back: homing, limits and holds, against the same cell with ideal switches.
 
-The machine behind the fake board moves its switches with its steps. The same cell, with switches that its own axis moves,
-is the ideal: what it says, where it ends, how many steps it makes. Of the driven one nothing else may come but later.
+The machine behind the fake board moves its switches with its steps. The same cell, with switches that its own axis
+moves, is the ideal: what it says, where it ends, how many steps it makes. Of the driven one the same may come, later.
 """
 
 from random import Random

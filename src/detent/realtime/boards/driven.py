@@ -18,7 +18,9 @@ from detent.controllers.device import DriveSet, Powered, Stage, StageSet
 from detent.lines.line import Heard
 from detent.pins import Level, PinSet
 from detent.realtime.boards.axle import Axle, Motion
+from detent.realtime.boards.board import State
 from detent.realtime.boards.channels import Channel, alike
+from detent.realtime.boards.clock import Clock
 from detent.realtime.boards.events import (
     CountDiffers,
     DriverFault,
@@ -98,7 +100,10 @@ class Driven:
         self._raw: dict[str, Level] = {}  # as the boards last said
         self._given: dict[str, Level] = {}  # as the cell was told
         self._reports: deque[tuple[Ns, SetPin, Ns]] = deque(maxlen=256)  # what inputs gave, and the board's time of it
-        self._align = 0  # board ns at cell time 0
+        self._align = 0  # of `clock` at cell time 0
+        self._shift = 0  # of `clock` from the master's time
+        self._clock: Clock | None = None  # of the master, as it was last looked at
+        self._known: tuple[WallNs, Ns] = (wall(), 0)  # the last time that the master told
         self.lines = [HeldLine(cell, number, self._horizon) for number in range(len(cell.lines))]
         self.past = Past(cell, self._counts)
         self._committed: WallNs = 0
@@ -131,11 +136,25 @@ class Driven:
         began = pace.due(self.cell.now)
         assert began is not None
         self._align = began - self.cell.now
-        self.boards.align(self.cell.now, began)
+        self.boards.align(self.cell.now, began - self._shift)
 
     def clock(self) -> Ns:
-        """The boards' time, for the pace of the cell."""
-        return self.boards.ns_at(self._wall())
+        """The time of the master board, for the pace of the cell; without it, the host's from there on.
+
+        A board that comes back counts from elsewhere: its time is joined on to the one that went on meanwhile.
+        """
+        wall, master = self._wall(), self.boards.master
+        now = self._known[1] + wall - self._known[0]
+        if master.state in (State.READY, State.SHUT_DOWN):
+            if master.core.clock is not self._clock:
+                raw = self.boards.ns_at(wall)
+                if self._clock is not None:
+                    self._shift = now - raw
+                    self.boards.align(now - self._align, raw)
+                self._clock = master.core.clock
+            now = self.boards.ns_at(wall) + self._shift
+            self._known = wall, now
+        return now
 
     # -- as it is served ---------------------------------------------------------------------------------
 
@@ -539,7 +558,7 @@ class Driven:
             case InputChanged(_, name, level, at):
                 self._raw[name] = int(level)
                 if int(level) != self._given.get(name):
-                    self._give(name, int(level), at)
+                    self._give(name, int(level), at + self._shift)
             case Stopped():
                 axle = self._by_stepper[event.stepper]
                 if axle.standing is Standing.DRIVEN and event.input in self.plan.inputs:
@@ -632,6 +651,8 @@ class Driven:
         return waits
 
     def _recovered(self, event: Recovered) -> None:
+        now = self.clock()
+        self.boards.align(now - self._align, now - self._shift)
         for axle in self.axles:
             if axle.what.board != event.board:
                 continue

@@ -1,0 +1,374 @@
+"""A cell behind its pins, case by case: outputs, inputs, holds, held replies, memory, slips, failures, recovery."""
+
+import pytest
+from tests.realtime.boards.driven_bench import Bench, pulses
+
+from detent.realtime.boards.states import Standing, Weight
+from detent.ticks import MS, SECOND, US, Ns
+
+CELL = """
+[units.x]
+model = "gs-c200s"
+straps = { CHS = "low" }
+[boards.b]
+serial = "fake"
+lead = "30 ms"
+[hardware.x]
+board = "b"
+step = "!gpio2"
+dir = "gpio3"
+enable = "!gpio4"
+outputs = { MOV = "gpio6", RDY = "!gpio7", UO1 = "gpio8" }
+inputs = { EOT = "^gpio10", HOME = "^gpio11", ENABLE = "^gpio12", UI1 = "^!gpio13", UI2 = "^gpio14" }
+"""
+LEAD = 30 * MS
+
+
+def levels(bench: Bench, pin: str, board: str = "b") -> list[tuple[Ns, bool]]:
+    """What a pin of the board did, by cell time less the lead."""
+    port = bench.ports[board]
+    port.run_to(bench.wall)
+    scale = bench.boards.boards[board].core.scale
+    return [(scale.time(tick), level) for tick, name, level in bench.machines[board].edges if name == pin]
+
+
+def weights(bench: Bench) -> list[Weight]:
+    return [news.weight for news in bench.news]
+
+
+def test_outputs_change_with_the_pulses_they_belong_to() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "A1")
+        bench.run(50 * MS)
+        bench.type("x", "+40")
+        bench.rest()
+        motion = pulses(bench.driven.axles[0].motions.since(0), bench.cell.now)
+        (begun, high), (over, low) = levels(bench, "gpio6")[-2:]
+        assert (high, low) == (True, False)
+        assert bench.cell.recording is not None
+        assert abs(over - motion[-1][0]) <= 2 * US, "MOV falls with the last step"
+        assert begun < motion[0][0]
+        assert [level for _, level in levels(bench, "gpio4")][-1] is False, "the driver is enabled, active low"
+        assert levels(bench, "gpio8")[-1][1] is True
+        # RDY is active low on this board
+        assert [level for _, level in levels(bench, "gpio7")][-2:] == [True, False]
+
+
+def test_inputs_are_read_before_the_unit_is_switched_on() -> None:
+    """With REC low the module homes at power-on ("Recall"): both switches closed, it is done without a step."""
+    text = CELL.replace('CHS = "low"', 'CHS = "low", REC = "low"')
+    with Bench(text, switches={"x.EOT": ("x", -5, 5), "x.HOME": ("x", -5, 5)}) as bench:
+        bench.run(500 * MS)
+        assert bench.edges("x") == []
+        assert bench.cell.controller("x").status(bench.cell.now).state == "ready"
+
+
+def test_an_input_that_stops_nothing_reaches_the_cell_when_it_arrives() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.press("x.UI1", 0)
+        bench.run(50 * MS)
+        bench.type("x", "V2")
+        bench.run(100 * MS)
+        assert bench.said("x") == "V60\r"
+        bench.press("x.UI1", 1)
+        bench.run(50 * MS)
+        bench.type("x", "V2")
+        bench.run(100 * MS)
+        assert bench.said("x") == "V60\rV70\r"
+
+
+def test_a_gentle_stop_keeps_its_ramp() -> None:
+    """g+1 stops through the ramp when UI1 goes low: nothing is cut, the reaction is a lead and some milliseconds."""
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.press("x.UI1", 1)
+        for line in ("S20", "T60", "R30", "g+1"):
+            bench.type("x", line)
+            bench.run(20 * MS)
+        bench.run(400 * MS)
+        assert "x.UI1" not in bench.driven.axes()[0].armed
+        bench.press("x.UI1", 0)
+        bench.rest()
+        assert bench.driven.rewinds == 0
+        assert bench.news == []
+        assert bench.position("x") == bench.driven.axes()[0].shaft > 100
+
+
+def test_enable_holds_the_pulse_in_the_firmware() -> None:
+    """ENABLE low holds the next pulse until it is high again (pin 24): no step comes between, and none is lost."""
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "S50")
+        bench.run(20 * MS)
+        bench.type("x", "+300")
+        bench.run(203 * MS)
+        low = bench.boards.cell_at(bench.wall) - LEAD
+        bench.press("x.ENABLE", 0)
+        bench.run(300 * MS)
+        assert bench.driven.rewinds == 1
+        high = bench.boards.cell_at(bench.wall) - LEAD
+        bench.press("x.ENABLE", 1)
+        bench.run(20 * MS)
+        bench.rest()
+        scale = bench.boards.boards["b"].core.scale
+        times = [scale.time(tick) for tick, _ in bench.edges("x")]
+        assert len(times) == 300
+        assert not [at for at in times if low + 200 * US < at < high]
+        assert bench.news == []
+
+
+def test_replies_wait_until_nothing_can_change_them() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "V1")
+        bench.run(200 * MS)
+        assert bench.said("x") == "V+0\r"
+        for board_ns, at, _ in bench.heard[0]:
+            held = board_ns - bench.driven._align - at
+            assert LEAD + 4 * MS <= held <= LEAD + 6 * MS
+
+
+def test_replies_at_once_for_hosts_that_do_not_wait() -> None:
+    with Bench(CELL.replace('lead = "30 ms"', 'lead = "30 ms"\nreplies = "at once"')) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "V1")
+        bench.run(200 * MS)
+        for board_ns, at, _ in bench.heard[0]:
+            assert 0 <= board_ns - bench.driven._align - at <= MS
+
+
+DCB = """
+[units.x]
+model = "dcb-274"
+[boards.b]
+serial = "fake"
+[hardware.x]
+board = "b"
+step = "gpio2"
+dir = "gpio3"
+inputs = { LIMIT-A = "^gpio10", LIMIT-B = "^gpio11", HOME = "^gpio12" }
+"""
+
+
+def positions(bench: Bench) -> list[int]:
+    """What a host reads that asks all the time, while the axis runs into a limit at 200."""
+    bench.run(100 * MS)
+    bench.type("x", " ")
+    bench.run(200 * MS)
+    bench.type("x", "M 2000")
+    for _ in range(90):
+        bench.run(7 * MS)
+        bench.send("x", b"Z 0\r")
+    bench.run(200 * MS)
+    assert bench.driven.rewinds == 1
+    assert max(place for _, place in bench.edges("x")) == 200
+    words = [word.split() for word in bench.said("x").split("\n")]
+    return [int(word[-1]) for word in words if word[:2] == ["Z", "0"] and len(word) == 3]
+
+
+def test_what_a_host_heard_too_early_is_told() -> None:
+    """A position that a stop takes back was read within the lead: with replies at once it has escaped."""
+    text = DCB.replace('serial = "fake"', 'serial = "fake"\nreplies = "at once"')
+    with Bench(text, switches={"x.LIMIT-A": ("x", 200, 10**6)}) as bench:
+        assert max(positions(bench)) > 200
+        assert bench.driven.escaped > 0
+        assert any("took it back" in news.text for news in bench.news)
+
+
+def test_no_held_reply_contradicts() -> None:
+    with Bench(DCB, switches={"x.LIMIT-A": ("x", 200, 10**6)}) as bench:
+        read = positions(bench)
+        assert read == sorted(read)
+        assert read[-1] == 200
+        assert bench.driven.escaped == 0
+        assert bench.news == []
+
+
+def test_memory_is_written_once_and_only_when_it_is_certain() -> None:
+    written: list[tuple[str, bytes]] = []
+
+    def store(unit: str, image: bytes) -> bool:
+        written.append((unit, image))
+        return True
+
+    with Bench(DCB, switches={"x.LIMIT-A": ("x", 60, 10**6)}, store=store) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "M 400")
+        saved = False
+        for _ in range(400):
+            bench.run(1 * MS)
+            if bench.position("x") >= 55 and not saved:
+                saved = True
+                before = len(written)
+                bench.type("x", "S")  # within the lead of the limit
+        bench.rest()
+        assert bench.driven.rewinds == 1
+        assert saved
+        assert len(written) == before + 1
+        assert written[-1] == ("x", bench.cell.controller("x").kept_memory())
+        assert bench.position("x") == 60
+
+
+def test_a_stalled_computer_slips_once_and_loses_nothing() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "S50")
+        bench.run(20 * MS)
+        bench.type("x", "+400")
+        bench.run(300 * MS)
+        bench.stall(60 * MS)
+        bench.rest()
+        assert bench.driven.axles[0].stepper.slips == 1
+        assert weights(bench) == [Weight.WARNING]
+        assert "slipped by" in bench.news[0].text
+        assert [place for _, place in bench.edges("x")] == list(range(1, 401))
+        assert bench.boards.boards["b"].state.value == "ready"
+        assert bench.driven.axes()[0].shaft == 400
+
+
+def test_an_emergency_stop_stands_until_recover_and_goes_on_without_configuring() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "S50")
+        bench.run(20 * MS)
+        bench.type("x", "+400")
+        bench.run(300 * MS)
+        bench.driven.stop()
+        bench.run(100 * MS)
+        stopped = bench.position("x")
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.FAULT
+        assert not state.known
+        assert weights(bench) == [Weight.FAULT]
+        assert levels(bench, "gpio4")[-1][1] is True, "the driver is off"
+        bench.type("x", "+10")  # the controller takes it, the axis does not move
+        bench.run(200 * MS)
+        assert bench.position("x") == stopped
+        resets = bench.ports["b"].board.resets
+        bench.driven.recover()
+        bench.run(300 * MS)
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.DRIVEN
+        assert state.shaft == stopped
+        assert bench.ports["b"].board.resets == resets
+        assert "may have lost steps" in bench.news[-1].text
+        bench.type("x", "V1")
+        bench.run(100 * MS)
+        assert bench.said("x").endswith(f"V{stopped:+d}\r")
+        bench.type("x", "-7")
+        bench.rest()
+        assert bench.position("x") == stopped - 7 == bench.driven.axes()[0].shaft
+        assert levels(bench, "gpio4")[-1][1] is False
+
+
+def test_a_board_that_shuts_down_by_itself_is_told_and_recovered() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+200")
+        bench.run(300 * MS)
+        bench.ports["b"].run_to(bench.wall)
+        bench.ports["b"].board.stall(bench.ports["b"].board.frequency // 2)
+        bench.run(900 * MS)
+        assert bench.driven.axes()[0].standing is Standing.FAULT
+        assert "board b has shut down" in bench.driven.axes()[0].why
+        bench.driven.recover()
+        bench.run(500 * MS)
+        assert bench.driven.axes()[0].standing is Standing.DRIVEN
+        assert bench.driven.axes()[0].shaft == bench.position("x")
+
+
+def test_an_unplugged_board_ends_within_the_lead_and_comes_back() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "S50")
+        bench.run(20 * MS)
+        bench.type("x", "+400")
+        bench.run(300 * MS)
+        before = bench.position("x")
+        bench.ports["b"].unplugged = True
+        bench.run(500 * MS)
+        bench.ports["b"].run_to(bench.wall)
+        after = bench.position("x")
+        assert before < after <= before + 1000 * (LEAD + 5 * MS) // SECOND + 1
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.FAULT
+        assert "board b is gone" in state.why
+        assert not state.known
+        assert after <= state.shaft <= after + 3, "what was sent was carried out, but for the last batch"
+        bench.driven.recover()
+        bench.run(300 * MS)
+        assert bench.driven.axes()[0].standing is Standing.FAULT, "it is not there yet"
+        bench.ports["b"].unplugged = False
+        bench.run(3 * SECOND)
+        assert bench.driven.axes()[0].standing is Standing.DRIVEN
+        bench.type("x", "+5")
+        bench.rest()
+        assert bench.position("x") == bench.driven.axes()[0].shaft
+
+
+def test_a_board_that_was_restarted_does_not_know_where_the_motor_is() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+20")
+        bench.rest()
+        bench.ports["b"].unplugged = True
+        bench.run(500 * MS)
+        bench.ports["b"].board.clear()
+        bench.ports["b"].unplugged = False
+        bench.driven.recover()
+        bench.run(5 * SECOND)
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.DRIVEN
+        assert not state.known
+        assert any("nobody knows where the motor stands: send it home" in news.text for news in bench.news)
+        bench.type("x", "+5")
+        bench.rest()
+        assert bench.driven.axes()[0].shaft == 25
+
+
+def test_a_count_that_differs_is_a_fault() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+20")
+        bench.run(100 * MS)
+        stepper = next(part for part in bench.ports["b"].board.oids.values() if hasattr(part, "counting_up"))
+        stepper.position -= 1
+        bench.rest()
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.FAULT
+        assert "the board has counted 19 where the cell has 20" in state.why
+        assert state.shaft == 19
+        bench.driven.recover()
+        bench.run(200 * MS)
+        assert bench.driven.axes()[0].standing is Standing.DRIVEN
+
+
+def test_a_host_that_dies_leaves_a_motor_that_stands_and_outputs_at_rest() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "S50")
+        bench.run(20 * MS)
+        bench.type("x", "+4000")
+        bench.run(300 * MS)
+        before = bench.position("x")
+        bench.stall(5 * SECOND)  # it never comes back
+        port = bench.ports["b"]
+        port.run_to(bench.wall)
+        assert bench.position("x") <= before + 1000 * (LEAD + 5 * MS) // SECOND + 1
+        assert levels(bench, "gpio4")[-1][1] is True, "the watchdog has let the driver go"
+        assert port.board.reason is not None
+
+
+@pytest.mark.parametrize("power", [False, True])
+def test_closing_switches_the_drivers_off(power: bool) -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        if power:
+            bench.power("x", False)
+            bench.run(100 * MS)
+            assert levels(bench, "gpio4")[-1][1] is True
+        bench.driven.close()
+        bench.ports["b"].run_to(bench.wall + SECOND)
+        assert bench.machines["b"].outputs["gpio4"] is True
