@@ -112,6 +112,7 @@ class Driven:
         self._half: dict[str, tuple[bool, Ns]] = {}
         self.on_moving: Callable[[bool], None] = lambda moving: None  # something begins to move, or all is at rest
         self._was_moving = False
+        self.abandoned = False  # the cell cannot go on, and so nothing is done for it any more
         self.escaped = 0  # characters that hosts heard though they were taken back
         self.rewinds = 0
         self.longest_rewind: WallNs = 0
@@ -220,6 +221,9 @@ class Driven:
         due = self.boards.deadline()
         if due is not None and due <= wall:
             self.boards.due(wall)
+        if self.abandoned:
+            self.boards.events()
+            return
         for event in self.boards.events():
             self._happened(event)
         self._absorb()
@@ -636,6 +640,14 @@ class Driven:
         for axle in self.axles:
             if axle.standing is Standing.DRIVEN:
                 self._fault(axle, "emergency stop", known=False)
+
+    def abandon(self, why: str) -> None:
+        """The cell cannot go on: every board stops at once, for good."""
+        self.boards.emergency_stop(self._wall())
+        for axle in self.axles:
+            axle.standing, axle.why, axle.known = Standing.FAULT, why, False
+            axle.guard.release()
+        self.abandoned, self._pending = True, False
 
     def recover(self) -> list[str]:
         """Go on from where the motors stand: boards are made ready again. The axes whose board is waited for."""
