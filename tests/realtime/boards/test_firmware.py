@@ -353,10 +353,12 @@ def test_step_edges_are_where_they_were_sent() -> None:
     machine = Machine(MACHINE)
     made = Host(machine, setup()).begin()
     before = len(machine.records())
-    made.turn()  # that took a while
+    made.run(0.5)  # that took a while
+    target = machine.position + 500
     made.move(constant_acceleration.move(500, 500, 1, 500).train, 1)
     [started] = made.told
     assert isinstance(started, MotionStarted)
+    made.until(lambda: machine.position == target)
     made.rest()
     edges = [ns for ns, line, level, _ in machine.records()[before:] if line == STEP and level]
     assert len(edges) == 500

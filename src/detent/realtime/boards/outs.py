@@ -36,6 +36,7 @@ class DigitalOut:
         self._last_tick = -(1 << 62)  # of what was given
         self._first = setup.initial  # before all that was given
         self._back: bool | None = None  # taken back: the level that it had there
+        self._rewound = False
         self._fed_at: WallNs | None = None
         self.dead = True  # shut down, or not configured: nothing is sent
 
@@ -67,11 +68,12 @@ class DigitalOut:
         while self._given and self._given[-1].at > at:
             self._given.pop()
         self._back = self._given[-1].level if self._given else self._first
+        self._rewound = True
 
     def now(self, level: bool) -> None:
         """Take `level` as soon as may be, behind what was given to the board before; what was not is forgotten."""
         self._pending.clear()
-        self._back = level
+        self._back, self._rewound = level, False
 
     # -- what leaves
 
@@ -103,7 +105,7 @@ class DigitalOut:
             if not self._give(soonest, level, soonest, wall):
                 self._back = level
                 return
-            self.corrections += 1
+            self.corrections += self._rewound
         self._back = None
 
     def _give(self, tick: int, level: bool, soonest: int, wall: WallNs) -> bool:

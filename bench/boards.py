@@ -1,0 +1,162 @@
+"""Step pulses for real pins: how fast trains become runs of steps, and what driving a board costs.
+
+Processor time, not time of the wall: what else runs here does not count. The board is the fake one, in virtual time;
+its own work is not in the figures.
+"""
+
+from collections.abc import Callable
+from fractions import Fraction
+from statistics import median
+from time import process_time, process_time_ns
+
+import numpy as np
+
+from bench.rows import Row, print_table
+from detent.axis import MotionStarted
+from detent.outputs.steps import Error, Runs, Scale
+from detent.pulses import Accelerating, Train
+from detent.ramps import constant_acceleration, tick_accumulator
+from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.port import FakePort
+from detent.realtime.boards.frames import Reader, block
+from detent.realtime.boards.link import Link
+from detent.realtime.boards.setup import BoardSetup, Pin, StepperSetup
+from detent.realtime.boards.several import Boards
+from detent.ticks import MS, SECOND, US, to_fixed
+
+CLOCK = 12_000_000
+MILLION = 1e6
+
+
+def rows() -> list[Row]:
+    return [*compression_rows(), *link_rows(), *drive_rows()]
+
+
+def _ramps(rate: int) -> Train:
+    steps = rate // 20
+    up = Accelerating(0, 0, Fraction(rate * rate, steps), 0, steps)
+    return Train((up, Accelerating.down_from(up.end, 0, Fraction(rate * rate, steps), steps)))
+
+
+def _seconds(fn: Callable[[], object], least: float = 0.3) -> float:
+    """The median processor time of a call, of as many as take `least` seconds."""
+    fn()
+    times: list[float] = []
+    while sum(times) < least:
+        begin = process_time()
+        fn()
+        times.append(process_time() - begin)
+    return median(times)
+
+
+def compression_rows() -> list[Row]:
+    """Steps a second and steps a command; the baseline is their nearest ticks in NumPy, run by run of one step."""
+    trains = {
+        "ramps 0-100 k": _ramps(100_000),
+        "GS-C200 S100 T1000 R1000": constant_acceleration.move(1000, 10_000, 1000, 20_000).train,
+        "GenStepper 1-10 k": tick_accumulator.toward(10_000, 0, 62_500_000, 10_000, 20_000, 1000, 20_000).train,
+    }
+    errors: tuple[Error, ...] = ("exact", 1 * US, 5 * US, 25 * US)
+    found = []
+    for name, train in trains.items():
+        steps = train.steps or 0
+        times = train.times()
+        plain = steps / _seconds(lambda times=times: np.diff(times * CLOCK // SECOND).tolist()) / MILLION  # type: ignore[misc]
+        for error in errors:
+            scale = Scale(CLOCK)
+            runs = Runs(train, scale, error, -1).take()
+            speed = steps / _seconds(lambda t=train, e=error: Runs(t, Scale(CLOCK), e, -1).take()) / MILLION  # type: ignore[misc]
+            label = f"{name}, {error if error == 'exact' else f'{error // US} us'}"
+            found.append(Row(label, speed, "Msteps/s", "nearest ticks, NumPy", plain, 0.2))
+            found.append(Row(f"{label}: steps a command", steps / len(runs), "", "one by one", 1, None))
+    return found
+
+
+def link_rows() -> list[Row]:
+    """Messages of 10 bytes through the link and back as acknowledgements."""
+    message, count = bytes(10), 20_000
+
+    def through() -> None:
+        link, reader, sequence = Link(), Reader(), 0
+        link.sync(0)
+        link.take()
+        link.receive(block(0, b""), 0)
+        for n in range(count):
+            link.send(message)
+            if n % 5 == 4:
+                link.flush(n)
+                for found in reader.feed(link.take()):
+                    sequence = (found.sequence + 1) & 15
+                    link.receive(block(sequence, b""), n)
+
+    def frames() -> None:
+        for _ in range(count // 5):
+            block(0, message * 5)
+
+    kilo = count / 1000
+    return [
+        Row("messages through the link", kilo / _seconds(through), "k/s", "blocks alone", kilo / _seconds(frames), 20)
+    ]
+
+
+class _Driven:
+    """One axis on a fake board in virtual time; the host's own processor time is counted."""
+
+    def __init__(self) -> None:
+        self.wall = 0
+        steppers = (StepperSetup("slide", Pin("gpio2"), Pin("gpio3")),)
+        fake = FakeBoard(moves=512)
+        fake.kept_log = False
+        self.port = FakePort(fake)
+        self.boards = Boards([(BoardSetup("board", steppers=steppers), self.port)])
+        self.boards.start(0)
+        while not self.boards.ready:
+            self.turn()
+        self.boards.steppers["slide"].adopt(0)
+        self.boards.align(0, self.boards.ns_at(self.wall))
+        self.spent, self.commits = 0, list[int]()
+
+    def turn(self) -> None:
+        self.wall += MS
+        self.port.run_to(self.wall)
+        began = process_time_ns()
+        self.boards.due(self.wall)
+        self.spent = getattr(self, "spent", 0) + process_time_ns() - began
+
+    def move(self, train: Train) -> None:
+        now = self.boards.cell_at(self.wall)
+        self.boards.steppers["slide"].tell(MotionStarted(now, train.shifted(to_fixed(now)), 1, 1, 0))
+
+    def run(self, time: int) -> None:
+        for n in range(time // MS):
+            self.turn()
+            if n % 2:
+                began = process_time_ns()
+                self.boards.commit(self.boards.cell_at(self.wall), self.wall)
+                self.commits.append(process_time_ns() - began)
+                self.spent += self.commits[-1]
+            self.boards.events()
+
+
+def drive_rows() -> list[Row]:
+    """The host's share of a core at a rate, and what a commit takes; the baseline is the board at rest."""
+    resting = _Driven()
+    resting.run(2 * SECOND)
+    idle = 100 * resting.spent / (2 * SECOND)
+    found = []
+    for rate in (1000, 10_000, 30_000):
+        driven = _Driven()
+        driven.move(constant_acceleration.move(rate, rate, 1, None).train)
+        driven.run(2 * SECOND)
+        share = 100 * driven.spent / (2 * SECOND)
+        found.append(Row(f"processor at {rate} steps/s", share, "%", "at rest", idle, 15 if rate == 10_000 else None))
+        if rate == 10_000:
+            often, rare = median(driven.commits) / MS, sorted(driven.commits)[-len(driven.commits) // 100] / MS
+            rest = median(resting.commits) / MS
+            found.append(Row("a commit at 10 kHz, half of them", often, "ms", "at rest", rest, 0.2))
+            found.append(Row("a commit at 10 kHz, 99 % of them", rare, "ms", "at rest", rest, None))
+    return found
+
+
+if __name__ == "__main__":
+    print_table(rows())
