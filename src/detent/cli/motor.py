@@ -78,9 +78,8 @@ def motor(
     json
         Print everything as one line of JSON.
     """
+    from detent.cli.endings import asked_wrongly, failed
     from detent.cli.rig import made, spread_of
-    from detent.cli.target import asked_wrongly, failed
-    from detent.controllers.catalogue import CatalogueError
     from detent.motors.motor import MotorError
 
     try:
@@ -107,7 +106,7 @@ def motor(
         asked = _Move.of(found, move, start, slew, ramp, law)
         many = _Variants(spread_of(vary), variants, seed)
         _judge(asked, many, facts, sensitivity, pull_in, plot, json)
-    except (MotorError, CatalogueError, ValueError) as error:
+    except ValueError as error:  # MotorError, SettingError, CatalogueError
         asked_wrongly(error)
     except ImportError as error:
         failed(error)

@@ -1,21 +1,6 @@
-"""How a verb ends that cannot do what it was asked to; and what the verbs are pointed at (`realtime.target`)."""
+"""What the verbs are pointed at (`realtime.target`), and how one ends that cannot do what it was asked to."""
 
-import sys
-from typing import NoReturn
-
-from detent.cli import ASKED_WRONGLY, FAILED
+from detent.cli.endings import asked_wrongly, failed
 from detent.realtime.target import Target, target
 
 __all__ = ["Target", "asked_wrongly", "failed", "target"]
-
-
-def asked_wrongly(error: Exception | str) -> NoReturn:
-    """Say what is wrong in one line on stderr and exit with 2."""
-    print(f"detent: {error}", file=sys.stderr)
-    raise SystemExit(ASKED_WRONGLY)
-
-
-def failed(error: Exception | str) -> NoReturn:
-    """Say what failed in one line on stderr and exit with 1."""
-    print(f"detent: {error}", file=sys.stderr)
-    raise SystemExit(FAILED)
