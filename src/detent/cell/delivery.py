@@ -19,7 +19,7 @@ from detent.controllers.device import Device, DriveSet, EdgeSensitive, Output, P
 from detent.lines.line import EVERYBODY, Line
 from detent.pins import HIGH, LOW, Level, Net, PinSet
 from detent.ticks import NEVER, Ns
-from detent.uart import Sent
+from detent.uart import Format, Sent, heard_as
 
 MOST_DELIVERIES = 1_000
 
@@ -71,6 +71,7 @@ class Delivery:
         self.faults = Faults()
         self._hands: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
         self._supplied: set[int] = set()  # units that are switched on
+        self._strange: dict[int, Format] = {}  # units that speak in another format than their line
         self._driving: set[tuple[int, str]] = set()  # outputs that drive their nets: the others let them float
         self._deadlines: list[Ns] = [NEVER] * len(parts)
         self._line_deadline: Ns = NEVER  # the earliest of all lines
@@ -122,6 +123,8 @@ class Delivery:
                 place = self.wiring.speaks[index].get(item.port)  # type: ignore[union-attr]
                 if place is not None:
                     line = self.lines[place[0]]
+                    if index in self._strange:
+                        item = _as_heard(item, self._strange[index], line.format)  # type: ignore[arg-type]
                     line.from_unit(place[1], item)  # type: ignore[arg-type]
                     if line.deadline < self._line_deadline:
                         self._line_deadline = line.deadline
@@ -195,6 +198,12 @@ class Delivery:
         if len(forms) == 1 and line.format not in forms:
             line.change(forms.pop())
             self._plan_lines()
+        for unit, _ in self.wiring.lines[number]:
+            form = self.parts[unit].line_format  # type: ignore[attr-defined]
+            if form == line.format or line.hosted:
+                self._strange.pop(unit, None)
+            else:
+                self._strange[unit] = form
 
     def _plan_lines(self) -> None:
         earliest = NEVER
@@ -224,6 +233,9 @@ class Delivery:
             for place, (unit, port) in enumerate(units):
                 if places != _ALL:  # not everything is for everybody
                     heard = [arrival.sent for arrival in arrived if arrival.place in (place, EVERYBODY)]
+                    chars = [sent.char for sent in heard]
+                if unit in self._strange:
+                    heard = [_as_heard(sent, line.format, self._strange[unit]) for sent in heard]
                     chars = [sent.char for sent in heard]
                 if chars:
                     if self.recording is not None:
@@ -321,6 +333,12 @@ class Delivery:
         """Put another line in the place of a line."""
         self.lines[line] = other
         self._plan_lines()
+
+
+def _as_heard(sent: Sent, form: Format, read: Format) -> Sent:
+    """A character as it is taken for one of another format: damaged, if not another."""
+    heard = heard_as((sent.char,), form, read)
+    return sent._replace(char=heard[0] if heard else sent.char._replace(framing_ok=False))
 
 
 _ALL = {EVERYBODY}

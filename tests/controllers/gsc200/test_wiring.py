@@ -8,6 +8,7 @@ import pytest
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import Problem, parse
+from detent.controllers.device import Refused
 from detent.outputs import arrays, signals
 from detent.ticks import SECOND
 
@@ -100,3 +101,41 @@ def test_a_velocity_move_ends_at_the_first_pulse_of_a_clock_that_is_wired_to_its
     cell.run_to(10 * SECOND)
     assert [unit.status(cell.now).state for unit in cell.controllers().values()] == ["ready", "ready"]
     assert cell.controller("b").status(cell.now).position == 508
+
+
+def test_a_module_that_is_strapped_to_another_rate_takes_its_line_for_noise_from_the_next_power_on() -> None:
+    """Page 4, pins 4 to 6, "Baud Rate Programming": straps are read at power-on, and both ends need one rate."""
+    cell = built(multipoint(None, None) + "[[script]]\nat = 1\npower = { b = false }\n")
+    cell.run_to(SECOND // 2)
+    cell.set_pin("b", "BR0", 1)  # 4800 baud
+    cell.type("b", "+100")
+    cell.run_to(2 * SECOND)
+    assert cell.controller("b").status(cell.now).pulses == 100
+    cell.power("b", True)
+    for unit in ("b", "a"):
+        cell.type(unit, "+100")
+    cell.run_to(4 * SECOND)
+    assert cell.controller("b").status(cell.now).pulses == 100
+    assert cell.controller("a").status(cell.now).pulses == 100
+    cell.power("b", False)
+    cell.set_pin("b", "BR0", 0)
+    cell.power("b", True)
+    cell.type("b", "+100")
+    cell.run_to(6 * SECOND)
+    assert cell.controller("b").status(cell.now).pulses == 200
+
+
+def test_a_module_whose_pin_10_is_not_grounded_obeys_nothing() -> None:
+    """Page 4, pin 10: "for testing purpose only and it must be grounded for normal operation"."""
+    cell = built('[units.a]\nmodel = "gs-c200"\n')
+    cell.set_pin("a", "TEST", 1)
+    cell.type("a", "+10")
+    cell.run_to(SECOND)
+    assert cell.controller("a").status(cell.now).pulses == 10  # it counts from the next power-on
+    for on in (False, True):
+        cell.power("a", on)
+    cell.type("a", "+10")
+    cell.run_to(2 * SECOND)
+    assert cell.controller("a").status(cell.now).pulses == 10
+    assert cell.recording is not None
+    assert [entry.frame for entry in cell.recording.of("a") if isinstance(entry, Refused)] == ["TEST"]

@@ -58,9 +58,10 @@ class GsC200:
     def _reset(self) -> None:
         """Everything volatile as it is at power-on."""
         straps = self._straps
+        self._form = pins.character_format(straps)
         self._link = Link(pins.address(straps), straps["CHS"] == HIGH, self._ored)
         self._transmitter = Transmitter(pins.SERIAL_PORT.sends, self.line_format, self._out, timed=self._line_timing)
-        self._deaf = False  # no reception: REC low and RXD tied high
+        self._deaf = False  # no reception: REC low and RXD tied high, or TEST not grounded
         self._inbox: deque[Char] = deque()  # characters behind an M that is being stored
         self._storing: Program | None = None
         self._kept: Frame | None = None  # the one frame that came while an answer was being sent
@@ -92,7 +93,10 @@ class GsC200:
                 self._driver.set(pin.name, pin.rest, now)
         self._axis.gate(self._inputs["ENABLE"] == HIGH, now)
         self._motion.pulse_reset(now)
-        if self._straps["REC"] == LOW:
+        if self._straps["TEST"] == HIGH:
+            self._deaf = True
+            self._out.append(Refused(now, "TEST", "pin 10 must be grounded for normal operation: nothing is obeyed"))
+        elif self._straps["REC"] == LOW:
             self._recall(now)
 
     def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
@@ -179,8 +183,8 @@ class GsC200:
 
     @property
     def line_format(self) -> Format:
-        """How characters look on its line, by its straps."""
-        return pins.character_format(self._straps)
+        """How characters look on its line, by its straps as they were read at power-on."""
+        return self._form
 
     def status(self, now: Ns, axis: str = "") -> Status:
         """The position counter, pulses given since made, and one word: off ready programming running homing."""
