@@ -226,21 +226,25 @@ class Trsync(Part):
 
     def trsync_trigger(self, reason: int) -> None:
         """Fire now, and be done."""
-        self.trigger(reason)
+        self._fire(reason)
         self._report[0] = self._expire[0] = False
         self.can_trigger = False
         self.board.respond("trsync_state", oid=self.oid, can_trigger=0, trigger_reason=self.reason, clock=0)
 
     def trigger(self, reason: int) -> None:
-        """Fire, if it has not."""
+        """Fire, if it has not, and tell."""
+        if self._fire(reason):
+            self._tell()
+
+    def _fire(self, reason: int) -> bool:
         if not self.can_trigger:
-            return
+            return False
         self.can_trigger, self.reason = False, reason
         steppers, self.steppers = self.steppers, []
         for stepper in steppers:
             stepper.stop_signal = None
             stepper.stop()
-        self._tell()
+        return True
 
     def _reported(self, tick: int) -> None:
         self._report = self.board.at(tick + self.report_ticks, self._reported, check=False)
