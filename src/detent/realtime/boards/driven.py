@@ -499,6 +499,7 @@ class Driven:
                 what = f"a host heard {wrong.char.value:#04x} of {wrong.at / 1e9:.4f} s before a stop took it back"
                 self._say(Weight.WARNING, what + instead)
         self._tell_axles(stopped, shaft, motions, counts)
+        self._arm()  # before any pulse leaves
         self.commit()
         for out in self._outs.values():
             self._tell_out(out, levels[out.name], out.levels.since(places[out.name]), at, stopped)

@@ -49,6 +49,7 @@ class Stop:
         self._armed.clear()
         self._changes.clear()
         self._alive = False  # the trigger can fire
+        self._deaf = 0  # not 0: reports may still be of the trigger before
         self._quieting = 0  # 1: what is armed is nothing, its last word is awaited; 2: one more report
         self._firing: Stopped | None = None
 
@@ -119,6 +120,7 @@ class Stop:
             for oid in self._axis.oids:
                 core.command("stepper_stop_on_trigger", oid=oid, trsync_oid=self.oid)
             self._alive = True
+            self._listen_anew(wall)
         for name, level in added.items():
             self._on(self._inputs[name], level, at, wall)
 
@@ -135,6 +137,18 @@ class Stop:
         )  # fmt: skip
         self._axis.not_before(clock + verdict)
 
+    def _listen_anew(self, wall: WallNs) -> None:
+        """A report of the trigger before may be on its way still: only behind the answer to this they are of this one."""
+        self._deaf += 1
+        number = self._deaf
+
+        def came(_: Message, __: WallNs) -> None:
+            if number == self._deaf:
+                self._deaf = 0
+
+        oid = next(iter(self._inputs.values())).oid
+        self._core.ask("endstop_query_state", "endstop_state", came, wall, oid=oid)
+
     def _off(self, watched: _Watched) -> None:
         self._core.command(
             "endstop_home", oid=watched.oid, clock=0, sample_ticks=0, sample_count=0, rest_ticks=0, pin_value=0,
@@ -146,6 +160,7 @@ class Stop:
         oid = next(iter(self._inputs.values())).oid
 
         def came(_: Message, __: WallNs) -> None:
+            self._deaf = 0  # this question has taken the place of that one
             if self._quieting == 1:
                 self._quieting = 2
 
@@ -160,7 +175,7 @@ class Stop:
 
     def reported(self, message: Message, wall: WallNs) -> None:
         """A trsync_state came."""
-        if not self._alive:
+        if not self._alive or self._deaf:
             return
         if message.number("can_trigger"):
             if self._quieting == 2:
