@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from detent.cli import main
 from detent.cli.assemble import asm, disasm, list_
 
 SOURCE = "; two\nstart: s10 ; slow\n\tj start\n"
@@ -157,3 +158,15 @@ def test_a_source_saved_with_a_byte_order_mark_is_read(source: Path, capsys: pyt
     source.write_text("\ufeffA1\n")
     asm("gs-c200", source)
     assert capsys.readouterr().out.startswith("A1\n")
+
+
+def test_an_output_never_replaces_the_source(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "a.gsc"
+    source.write_text("S10\n")
+    (tmp_path / "link").symlink_to(source)
+    for verb in ("asm", "disasm"):
+        with pytest.raises(SystemExit) as caught:
+            main([verb, "gs-c200", str(source), "--output", str(tmp_path / "link")])
+        assert caught.value.code == 2
+        assert "is read here, and would be lost: write to another file" in capsys.readouterr().err
+    assert source.read_text() == "S10\n"

@@ -96,7 +96,7 @@ def test_nothing_is_sent_unless_all_of_it_can_be(
     assert "a bs0610 holds no programs; models that do: gs-c200" in capsys.readouterr().err
     source.write_bytes(b"\xff\x00")
     run("compare", "gs-c200", "/dev/no-such-device", source, status=2)
-    assert "byte FF on line 1, column 1 is no UTF-8" in capsys.readouterr().err
+    assert "it is no text in UTF-8: byte FF on line 1, column 1" in capsys.readouterr().err
 
 
 def test_what_does_not_fit_is_refused(source: Path, capsys: pytest.CaptureFixture[str]) -> None:

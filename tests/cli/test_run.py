@@ -372,7 +372,7 @@ def test_an_output_replaces_what_a_run_has_made_and_nothing_else_unasked(
     assert detent("run", "gs-c200", f"--{kind}", str(file)) == 0
     if kind != "plot":
         assert detent("run", str(arm), f"--{kind}", str(arm)) == 2
-        assert "is read by this run" in capsys.readouterr().err
+        assert "is read here, and would be lost" in capsys.readouterr().err
         assert arm.read_text() == ARM
 
 

@@ -68,9 +68,11 @@ def main(tokens: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0, 1 (it failed), 2 (it was asked wrongly)."""
     from cyclopts import CycloptsError
 
+    from detent.cli import plain
     from detent.extras import MissingExtra
 
     given = list(sys.argv[1:] if tokens is None else tokens)
+    plain.make_safe()
     before = _hear_termination()
     try:
         application(given[0] if given else "")(given)

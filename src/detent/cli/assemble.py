@@ -15,7 +15,7 @@ from detent.assembler import (
     disassemble,
     listing,
 )
-from detent.outputs.files import write_whole
+from detent.outputs.files import NotOurs, check_inputs, write_whole
 
 FAILED = 1
 ASKED_WRONGLY = 2
@@ -52,6 +52,7 @@ def asm(
         raise _asked_wrongly("an image is bytes and needs a file: add --output FILE, or choose --format hex")
     assembly = _assembly(model, file, json)
     if output is not None:
+        _keep_input(output, file)
         _write(output, _formatted(assembly, format or "image"))
     if json:
         _print_json({**_facts(assembly), "output": str(output) if output else None})
@@ -108,6 +109,7 @@ def disasm(model: str, file: Path, *, output: Path | None = None, json: bool = F
     except ImageError as error:
         raise _asked_wrongly(f"{file}: {error}; is it an image for the {model}?") from error
     if output is not None:
+        _keep_input(output, file)
         _write(output, source.encode())
     if json:
         written = str(output) if output else None
@@ -194,6 +196,13 @@ def _read(file: Path) -> bytes:
         return read_whole(file)
     except OSError as error:
         raise _asked_wrongly(f"{file}: {error.strerror or error}") from error
+
+
+def _keep_input(output: Path, file: Path) -> None:
+    try:
+        check_inputs(output, [file])
+    except NotOurs as error:
+        raise _asked_wrongly(str(error)) from error
 
 
 def _write(file: Path, data: bytes) -> None:

@@ -4,6 +4,7 @@ import json as json_text
 import sys
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from errno import EILSEQ
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -189,13 +190,14 @@ def _write(file: Path, saved: "Backup") -> None:
 
 def _text(file: Path) -> str:
     from detent.hosts.backups import BackupError
+    from detent.realtime.texts import read_text
 
     try:
-        return file.read_text()
+        return read_text(file)
     except OSError as error:
+        if error.errno == EILSEQ:
+            raise BackupError(f"it is no text file: {error.strerror}") from None
         raise BackupError(f"cannot read it: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise BackupError("it is no text file") from None
 
 
 def _before(model: str) -> Path:

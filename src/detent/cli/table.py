@@ -67,11 +67,14 @@ def table(
         Print everything as JSON.
     """
     from detent.cli.target import asked_wrongly, failed
-    from detent.outputs.files import write_whole
+    from detent.outputs.files import check_inputs, write_whole
     from detent.ramps.differences import EPROM, CurveError, compiled
     from detent.ramps.hex_records import intel_hex
 
     try:
+        for path in (bin_, hex_, text):
+            if path is not None:
+                check_inputs(path, [Path(curve)])
         clocks = _clocks(interval)
         wanted = {"peak": peak, "angular": angular, "phase": phase, "low": low, "high": high}
         law, seconds, name = _curve(curve, {key: value for key, value in wanted.items() if value is not None}, duration)

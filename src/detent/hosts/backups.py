@@ -45,7 +45,7 @@ class Backup(NamedTuple):
         """Read a file. Raises BackupError."""
         try:
             found = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
+        except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
             raise BackupError(f"it is no TOML: {error}") from None
         if found.get("format") != FORMAT:
             raise BackupError(f"it is no backup: those begin with format = {_value(FORMAT)}; detent backup writes them")

@@ -20,12 +20,15 @@ class NotOurs(ValueError):
 
 def check_place(path: Path, inputs: Sequence[Path] = ()) -> None:
     """Raise NotOurs if an output to `path` would replace one of the `inputs`, or a file that no run has made."""
-    if any(path.exists() and one.exists() and path.samefile(one) for one in inputs):
-        raise NotOurs(f"{path} is read by this run: write to another file, or over it with --force")
+    check_inputs(path, inputs, "write to another file, or over it with --force")
     if path.is_file() and not _is_ours(path):
-        raise NotOurs(
-            f"{path} is there already, and was not made by a run: write to another file, or over it with --force"
-        )
+        raise NotOurs(f"{path} was not made by a run: write to another file, or over it with --force")
+
+
+def check_inputs(path: Path, inputs: Sequence[Path], remedy: str = "write to another file") -> None:
+    """Raise NotOurs if an output to `path` would replace one of the `inputs`, under whatever name."""
+    if any(path.exists() and one.exists() and path.samefile(one) for one in inputs):
+        raise NotOurs(f"{path} is read here, and would be lost: {remedy}")
 
 
 def _is_ours(path: Path) -> bool:

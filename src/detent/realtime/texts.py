@@ -29,7 +29,7 @@ def read_text(path: Path) -> str:
         line, column = data.count(b"\n", 0, error.start) + 1, error.start - data.rfind(b"\n", 0, error.start)
         raise OSError(
             errno.EILSEQ,
-            f"byte {data[error.start]:02X} on line {line}, column {column} is no UTF-8: save it as UTF-8",
+            f"it is no text in UTF-8: byte {data[error.start]:02X} on line {line}, column {column}; save it as UTF-8",
             str(path),
         ) from None
     return io.StringIO(text, newline=None).read()
