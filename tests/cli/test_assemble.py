@@ -160,13 +160,17 @@ def test_a_source_saved_with_a_byte_order_mark_is_read(source: Path, capsys: pyt
     assert capsys.readouterr().out.startswith("A1\n")
 
 
-def test_an_output_never_replaces_the_source(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = tmp_path / "a.gsc"
+def test_an_output_never_replaces_what_it_is_made_from(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, image = tmp_path / "a.gsc", tmp_path / "a.bin"
     source.write_text("S10\n")
-    (tmp_path / "link").symlink_to(source)
-    for verb in ("asm", "disasm"):
+    with pytest.raises(SystemExit):
+        main(["asm", "gs-c200", str(source), "--output", str(image)])
+    for verb, file in (("asm", source), ("disasm", image)):
+        link = tmp_path / f"{verb}.link"
+        link.symlink_to(file)
+        before = file.read_bytes()
         with pytest.raises(SystemExit) as caught:
-            main([verb, "gs-c200", str(source), "--output", str(tmp_path / "link")])
+            main([verb, "gs-c200", str(file), "--output", str(link)])
         assert caught.value.code == 2
         assert "is read here, and would be lost: write to another file" in capsys.readouterr().err
-    assert source.read_text() == "S10\n"
+        assert file.read_bytes() == before

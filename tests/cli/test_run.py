@@ -126,7 +126,8 @@ def test_steps_are_written_as_runs(tmp_path: Path, capsys: pytest.CaptureFixture
         assert axis == "gs-c200s"
         ticks += [base + k * interval + add * k * (k - 1) // 2 for k in range(1, count + 1)]
         directions += [int(direction)] * count
-    kept = np.load(arrays)
+    with np.load(arrays) as archive:
+        kept = dict(archive)
     assert directions == kept["gs-c200s/step_directions"].tolist() == [-1] * 300
     for tick, time in zip(ticks, kept["gs-c200s/step_times"].tolist(), strict=True):
         assert abs(tick * 1000 - time * 16) <= 16 * 1000
