@@ -636,6 +636,11 @@ class Board:
             return
         if self.state is State.CONFIGURING and not self._recovering:
             self._refuse("", "", f"the firmware does not take this configuration: {reason}")
+        elif self.state is State.CONFIGURING and message.name == "shutdown":
+            # a watchdog that nobody has fed since it was lost: it is taken from there, as if it had been found so
+            self.core.forget_questions()
+            self._wait_until = None
+            self.core.ask("get_config", "config", self._configured, wall)
         elif self.state is State.READY:
             self._fall(State.SHUT_DOWN)
             self.reason = reason
