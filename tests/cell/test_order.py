@@ -176,6 +176,33 @@ def test_a_damper_makes_no_step_when_its_controller_is_switched_on(order: list[s
     assert pulses(cell, DAMPED) == {"u0.": [], "u1": []}
 
 
+ALONE = """
+[units.%s]
+model = "gs-c200"
+straps = { REC = "low" }
+powered = false
+eeprom = "%s"
+[switches.%s]
+drives = ["%s.EOT", "%s.HOME"]
+level = 0
+"""
+
+
+@pytest.mark.parametrize("first", ["a", "b"])
+@pytest.mark.parametrize("wait", ["W1\n+10", "G+1"])
+def test_units_that_the_script_switches_on_in_one_go_find_each_others_outputs(first: str, wait: str) -> None:
+    """b must not take the wire for open: a, which drives it to 0, is switched on in the same instant."""
+    programs = {"a": "D1\nA1", "b": wait}
+    text = "".join(ALONE % (unit, unit, f"{unit}2", unit, unit) for unit in ("a", "b"))
+    text += '[[wires]]\nfrom = "a.UO1"\nto = "b.UI1"\n[[script]]\nat = "50 ms"\n'
+    text += "power = { a = true, b = true }\n" if first == "a" else "power = { b = true, a = true }\n"
+    cell = build(parse(text, "cell"), lambda file: programs[file])
+    cell.run_to(SECOND // 8)
+    assert cell.controller("b").status(cell.now).pulses == 0
+    cell.run_to(SECOND)
+    assert cell.controller("b").status(cell.now).pulses == (10 if wait.startswith("W") else 0)
+
+
 @pytest.mark.slow
 @given(orders())
 @settings(max_examples=10_000)

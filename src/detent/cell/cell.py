@@ -44,6 +44,11 @@ class Script(tuple[Action, ...]):
         return self
 
 
+def _switches_on(action: Action) -> bool:
+    """Whether the script switches a unit on."""
+    return isinstance(action.deed, Power) and action.deed.on and not action.outside
+
+
 class Cell(Delivery):
     """Everything in one virtual time. Made by `detent.cell.build`."""
 
@@ -140,10 +145,26 @@ class Cell(Delivery):
             self._next_action += 1
             self._note_next_action()
             self._acting = True
-            action.deed.do(self)
+            if _switches_on(action):
+                units = [self.unit(name) for name in self._switched_on_with(action)]
+                self.supply_all([unit for unit in units if not self.faults.switches(self.wiring.names[unit], True)])
+            else:
+                action.deed.do(self)
             self._acting = False
             while min(self._deadlines) <= at:
                 self._advance_parts(at)
+
+    def _switched_on_with(self, action: Action) -> list[str]:
+        """The units that the script switches on in one go: that of `action`, and those of the actions behind it."""
+        units = [action.deed.unit]  # type: ignore[union-attr]
+        while self._next_action < len(self._script):
+            following = self._script[self._next_action]
+            if following.at != action.at or not _switches_on(following):
+                break
+            units.append(following.deed.unit)  # type: ignore[union-attr]
+            self._next_action += 1
+            self._note_next_action()
+        return units
 
     def _note_next_action(self) -> None:
         left = self._next_action < len(self._script)
