@@ -4,11 +4,12 @@ from random import Random
 
 import pytest
 from tests.controllers.laws.adapter import Limit, Model, history, ready
-from tests.controllers.laws.bench import Bench, Watch
+from tests.controllers.laws.bench import Bench, Deed, Put, Wait, Watch
 from tests.controllers.laws.histories import ORDINARY, THOROUGH, History, hold
 from tests.controllers.laws.models import every_model
 
-from detent.ticks import SECOND, Ns
+from detent.pins import LOW
+from detent.ticks import MS, SECOND, Ns
 
 
 class Guard(Watch):
@@ -70,17 +71,29 @@ class Guard(Watch):
 
 
 def a_closed_limit_is_not_passed(model: Model, past: History) -> bool:
+    """By its contacts, or by one that closes ahead of an axis in motion and stays so while the host goes on."""
     bench = ready(model, past)
     guards = [Guard(limit) for limit in model.limits()]
     bench.watches += guards
     bench.play(past.deeds)
+    pins = [pin.name for pin in bench.device.pins]
+    for limit in model.limits():
+        if limit.direction in (0, bench.travels[limit.axis].direction) and limit.name in pins and bench.moving:
+            bench.play((Put(limit.name, LOW),))
+            break
+    bench.play(past.later)
     bench.go_to(bench.now + 3 * SECOND)
     return any(guard.met for guard in guards)
 
 
 def check(model: Model, count: int) -> None:
     def make(draw: Random) -> tuple[History, None]:
-        return history(model, draw), None
+        past = history(model, draw, 16)
+        contacts = next((found for _ in range(9) if (found := model.contacts(draw))), ())
+        later: list[Deed] = []
+        for _ in range(draw.randrange(4)):
+            later += (*model.deeds(draw), Wait(draw.choice((0, 1 * MS, 9 * MS, 40 * MS))))
+        return past._replace(contacts=contacts, later=tuple(later)), None
 
     told = hold(lambda past, _: a_closed_limit_is_not_passed(model, past), make, count, f"limits of {model.name}")
     assert told > count // 10
