@@ -1,7 +1,7 @@
 """GENDEMO (manual, pages 49 and 50): both motors between 0 and 2000, in every step mode, by the RDY line.
 
-Run it beside an emulated board with `python gendemo.py`. The Stamp's program goes on for ever, this one for four
-cycles, one for each step mode.
+Run it beside an emulated board with `python gendemo.py`; on a serial port, which has no RDY, gendemoser.py does the
+same. The Stamp's program goes on for ever, this one for four cycles, one for each step mode.
 """
 
 import sys
@@ -36,6 +36,6 @@ def wait_ready(one: Stamp) -> None:
 
 
 if __name__ == "__main__":
-    host = stamp(sys.argv[1:])
+    host = stamp(sys.argv[1:], watches_ready=True)
     gendemo(host)
     tell(host)

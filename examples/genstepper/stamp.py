@@ -77,9 +77,15 @@ class SerialStamp:
     """A Stamp's program on a computer with a serial port."""
 
     def __init__(self, port: str) -> None:
+        """A device, or a URL that pyserial knows; HOST:PORT is a TCP port. SystemExit where it cannot be opened."""
         import serial
 
-        self._port = serial.Serial(port, 9600)
+        host, colon, number = port.rpartition(":")
+        tcp = bool(colon) and "//" not in port and number.isdigit()
+        try:
+            self._port = serial.serial_for_url(f"socket://{host or 'localhost'}:{number}" if tcp else port, 9600)
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise SystemExit(f"{port}: cannot open it ({error}); give a serial device, or HOST:PORT") from None
 
     def serout(self, text: str) -> None:
         """Send, and wait until it has gone."""
@@ -98,14 +104,22 @@ class SerialStamp:
 
     def busy(self) -> bool:
         """RDY is not on the serial connector."""
-        raise RuntimeError(
-            "this program watches RDY, which no serial port has: run it without a port, or use gendemoser"
-        )
+        raise RuntimeError(NO_READY)
 
 
-def stamp(arguments: list[str]) -> Stamp:
-    """The Stamp that a command line asks for: a port, or nothing."""
-    return SerialStamp(arguments[0]) if arguments else VirtualStamp()
+NO_READY = "this program watches RDY, which no serial port has: run it without a port, or use gendemoser"
+
+
+def stamp(arguments: list[str], *, watches_ready: bool = False) -> Stamp:
+    """The Stamp that a command line asks for: a port, or nothing.
+
+    SystemExit, before anything moves, for a port that cannot do what the program needs.
+    """
+    if not arguments:
+        return VirtualStamp()
+    if watches_ready:
+        raise SystemExit(NO_READY)
+    return SerialStamp(arguments[0])
 
 
 def tell(one: Stamp) -> None:

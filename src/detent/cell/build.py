@@ -11,7 +11,7 @@ from detent.cell import real_pins
 from detent.cell.cell import Cell
 from detent.cell.deeds import Action, Power, SetSwitch, Type
 from detent.cell.delivery import Store, Typed, no_store, nobody_asks
-from detent.cell.description import Description, Problem, ScriptEntry, Unit
+from detent.cell.description import Description, Motor, Problem, ScriptEntry, Unit
 from detent.cell.fitting import check_names, mechanics, motors_by_axis, split_axis
 from detent.cell.mechanics import Mechanics
 from detent.cell.parts import PARTS, Part
@@ -73,6 +73,7 @@ class _Builder:
         self.nets: list[list[_End]] = []
         self.axes: dict[int, int] = {}  # switch or motor -> the unit whose axis it follows
         self.contacts: dict[str, int] = {}  # switch that a rotor moves -> the motor
+        self.remarks: list[str] = []
 
     def problem(self, key: str, message: str) -> Problem:
         return Problem(self.description.file, key, message)
@@ -131,6 +132,29 @@ class _Builder:
             if not 0 <= load <= limits.loads[pin]:
                 most = f"{pin} gives at most {limits.loads[pin] * 1000:g} mA"
                 raise self.problem(f"{key}.loads", f"{load * 1000:g} mA from {pin}: {most}")
+
+    def check_motor_supply(self, name: str, entry: Motor) -> None:
+        """A motor on the power stage of a controller has a supply that this one stands."""
+        found = self.models.get(entry.unit or "")
+        low, high = found.limits.motor_supply if isinstance(found, Model) else NO_LIMITS.motor_supply
+        if not low <= entry.supply <= high:
+            assert found is not None
+            what = f"{entry.supply:g} V: the motors of a {found.name} have {low:g} to {high:g} V"
+            raise self.problem(f"motors.{name}.supply", what)
+
+    def look_at_windings(self, name: str, entry: Motor, made: Mechanics) -> None:
+        """Remark on a motor that draws more current than its power stage stands."""
+        found = self.models.get(entry.unit or "")
+        if entry.unit is None or not isinstance(found, Model):
+            return
+        amps, most = made.rig.most_current, found.limits.winding(self.controller(entry.unit))
+        if amps > most * 1.0005:  # as much as is shown
+            less = entry.supply * most / amps
+            lower = f"lower the supply to {less:.2f} V, or" if less >= found.limits.motor_supply[0] else "so"
+            self.remarks.append(
+                f"{name}: {amps:.3g} A in each winding at {entry.supply:g} V, and this {found.name} stands {most:g} A, "
+                f"beyond which a real one fails; {lower} give it a resistance"
+            )
 
     def straps(self, lines: Mapping[str, list[str]]) -> dict[str, dict[str, Level]]:
         """The straps of every controller, completed line by line."""
@@ -289,7 +313,10 @@ class _Builder:
             if entry.unit is not None:
                 self.axes[len(self.parts)] = self.names.index(entry.unit)
             self.names.append(name)
-            self.parts.append(mechanics(described, name, mine, shaft, record))
+            self.check_motor_supply(name, entry)
+            made = mechanics(described, name, mine, shaft, record)
+            self.look_at_windings(name, entry, made)
+            self.parts.append(made)
 
     def make_switches(self) -> None:
         for name, entry in self.description.switches.items():
@@ -416,7 +443,7 @@ class _Builder:
                 hears[-1] += ((host, port.receives),)
                 speaks[host][port.sends] = line, len(ports)
         return Wiring(tuple(self.names), units, tuple(drives), tuple(reads), tuple(followers),
-                      tuple(hears), tuple(lines), tuple(line_of), tuple(speaks))  # fmt: skip
+                      tuple(hears), tuple(lines), tuple(line_of), tuple(speaks), tuple(self.remarks))  # fmt: skip
 
     # -- script ------------------------------------------------------------------------------------------
 

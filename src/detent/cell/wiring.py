@@ -39,6 +39,7 @@ class Wiring(NamedTuple):
     line_names: tuple[str, ...]
     line_of: tuple[int, ...]  # unit -> line of its host; -1: none
     speaks: tuple[Mapping[str, tuple[int, int]], ...]  # unit -> port it sends from -> line, place on the line
+    remarks: tuple[str, ...] = ()  # what a real cell would not stand, in words
 
     def __deepcopy__(self, _: object) -> "Wiring":
         return self

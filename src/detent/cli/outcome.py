@@ -116,6 +116,8 @@ def facts(told: Outcome) -> dict[str, object]:
              "reason": refused.reason, "answers": [] if line is None else answers(line)}
             for unit, refused, line in told.refused
         ]  # fmt: skip
+    if told.cell.wiring.remarks:
+        result["remarks"] = list(told.cell.wiring.remarks)
     if told.moving:
         result["moving"] = _moving(told)
     if told.motors:
@@ -213,6 +215,8 @@ def warn(told: Outcome) -> None:
     """What went wrong, a line each on stderr."""
     from detent.ticks import show_duration
 
+    for remark in told.cell.wiring.remarks:
+        _warn(remark)
     for unit, caution in told.conversation.cautions[:MOST_SHOWN]:
         _warn(f"{unit} obeys {caution.frame!r} at {show_duration(caution.at)}: {caution.what}")
     for unit, refused, line in told.refused[:MOST_SHOWN]:

@@ -141,7 +141,7 @@ def one_of(**meanings: Any) -> Callable[[str], Any]:
 
 
 def _genstepper(given: Mapping[str, Any]) -> Answer:
-    from detent.controllers.genstepper.supply import STEP_MODES, Question, size, voltage_for
+    from detent.controllers.genstepper.supply import DRIVER_DROP, STEP_MODES, Question, size, voltage_for
 
     values = dict(given)
     current = values.pop("current")
@@ -154,6 +154,8 @@ def _genstepper(given: Mapping[str, Any]) -> Answer:
     mode = STEP_MODES[question.mode]
     lines = [
         Line("motor supply", f"{question.voltage:.3g} V"),
+        Line("left for the motor", f"{sheet.motor_volts[0]:.3g} to {sheet.motor_volts[1]:.3g} V, by temperature: the "
+             f"drivers drop {DRIVER_DROP[0]:g} to {DRIVER_DROP[1]:g} V (page 78)"),
         Line("winding current", f"{sheet.winding_current:.3g} A"),
         Line(f"{question.motors} motor{'s' * (question.motors > 1)}, {mode.name}",
              f"{sheet.motor_current[0]:.3g} A, recommended {sheet.motor_current[1]:.3g} A"),
@@ -164,6 +166,7 @@ def _genstepper(given: Mapping[str, Any]) -> Answer:
     facts = {
         "voltage_v": question.voltage,
         "winding_a": sheet.winding_current,
+        "motor_v": {"least": sheet.motor_volts[0], "most": sheet.motor_volts[1]},
         "motors_a": {"absolute": sheet.motor_current[0], "recommended": sheet.motor_current[1]},
         "logic_a": sheet.logic_current,
         "supply_a": {"absolute": sheet.supply_current[0], "recommended": sheet.supply_current[1]},

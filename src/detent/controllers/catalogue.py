@@ -17,6 +17,7 @@ from detent.controllers.dcb274.phrases import Phrases as Dcb274Phrases
 from detent.controllers.device import CommandHelp, Controller
 from detent.controllers.genstepper import commands as genstepper_commands
 from detent.controllers.genstepper import pins as genstepper_pins
+from detent.controllers.genstepper import supply as genstepper_supply
 from detent.controllers.genstepper.firmware import GenStepper
 from detent.controllers.genstepper.phrases import Phrases as GenStepperPhrases
 from detent.controllers.gsc200 import commands as gsc200_commands
@@ -36,6 +37,9 @@ from detent.ramps import differences
 from detent.ramps.short_movements import Way
 from detent.ticks import US, parse_duration
 
+CURRENT_STRAPS = frozenset({*genstepper_pins.HALF_JUMPERS, "FUL", "R1K"})
+"""Straps that choose a motor's current: S1K halves it and R1K doubles it, so none is a guess for another."""
+
 
 class CatalogueError(ValueError):
     """A model, strap or option that does not exist, or a value it does not take; the text has the remedy."""
@@ -53,10 +57,15 @@ class Option(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What the manual allows: the supply in V, least and most, and the load of each supply output in A."""
+    """What the manual allows: the supply in V, least and most, and the load of each supply output in A.
+
+    The same for motors that hang on the controller itself: their supply, and the current of a winding as it is made.
+    """
 
     supply: tuple[float, float] = (0.0, float("inf"))
     loads: Mapping[str, float] = {}
+    motor_supply: tuple[float, float] = (0.0, float("inf"))
+    winding: Callable[[Any], float] = lambda controller: float("inf")
 
 
 NO_LIMITS = Limits()
@@ -85,11 +94,20 @@ class Model(NamedTuple):
     phrases: Callable[[Mapping[str, Level]], Phrases] = lambda straps: Lines()  # what is said on its line, in words
 
 
-def unknown(kind: str, name: str, known: Sequence[str]) -> CatalogueError:
-    """The error for a name that is not among the known ones, with the likeliest of them."""
-    near = get_close_matches(name, known, 1, 0.5) or [k for k in known if k.lower() == name.lower()]
+def unknown(kind: str, name: str, known: Sequence[str], *, guess: bool = True) -> CatalogueError:
+    """The error for a name that is not among the known ones, with the likeliest of them.
+
+    Without `guess` only another case of it is suggested. Never one end of an axis, like LX-, where LX+ is there too.
+    """
+    near = [k for k in known if k.lower() == name.lower()]
+    if guess and not near:
+        near = [k for k in get_close_matches(name, known, 1, 0.5) if _opposite(k) == k or _opposite(k) not in known]
     hint = f"did you mean {near[0]}? " if near else ""
     return CatalogueError(f"no {kind} {name!r}; {hint}there are: {', '.join(known)}")
+
+
+def _opposite(name: str) -> str:
+    return name[:-1] + {"+": "-", "-": "+"}.get(name[-1:], name[-1:])
 
 
 def model(name: str) -> Model:
@@ -132,7 +150,8 @@ class Configurable(Protocol):
 def strap_level(found: Configurable, pin: str, value: object) -> Level:
     """The level that `value` (0, 1, low, high, open) gives to a strap. Raises CatalogueError."""
     if pin not in found.straps:
-        raise unknown(f"strap of the {found.name}", pin, tuple(found.straps))
+        guess = pin.upper() not in CURRENT_STRAPS and not CURRENT_STRAPS & found.straps.keys()
+        raise unknown(f"strap of the {found.name}", pin, tuple(found.straps), guess=guess)
     text = str(value).strip().lower()
     levels = {"0": 0, "low": 0, "1": 1, "high": 1}
     if text == "open":
@@ -295,6 +314,11 @@ def _genstepper(name: str, port: str) -> Model:
         None,
         lambda: genstepper_commands.reference(name),
         lambda units: genstepper_pins.strap_line(name, units),
+        limits=Limits(
+            genstepper_supply.MOTOR_VOLTS,
+            motor_supply=genstepper_supply.MOTOR_VOLTS,
+            winding=lambda board: float(board.most_current),
+        ),
         phrases=lambda straps: GenStepperPhrases(),
     )
 

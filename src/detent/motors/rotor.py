@@ -51,6 +51,13 @@ class Rig(Shared):
     by_time: Floats = field(init=False)
     by_position: Floats = field(init=False)
 
+    @property
+    def most_current(self) -> float:
+        """Amperes in a phase at standstill and full power: of a drive that only switches, what the resistance lets."""
+        if self.drive.decay != "voltage":
+            return self.drive.current
+        return self.drive.volts / (self.motor.resistance + self.drive.resistance)
+
     def __post_init__(self) -> None:
         motor, drive, load = self.motor, self.drive, self.load
         drive.check(motor)

@@ -64,7 +64,7 @@ class Service:
         """
         self.description = description
         self.driven: Driven | None = None
-        self.reports: list[str] = []  # about images that could not be used
+        self.reports: list[str] = []  # about images that could not be used, and what a real cell would not stand
         if wanted and any(w.kind == "serial" for w in wanted):
             line_timing = False  # the wire outside takes the time
         if real is not None and pace != 1:
@@ -81,6 +81,7 @@ class Service:
                 description, read, images, line_timing, self.reports, observed or real is not None,
                 None if stores is None else stores.save, inputs,
             )  # fmt: skip
+            self.reports += self.cell.wiring.remarks
             self._observed = observed
             if observed:
                 _watch(self.cell, passes_on=real is not None)

@@ -15,6 +15,7 @@ from detent.controllers.genstepper.inputs import FIRST_RATE, STANDARD_RATES, Key
 from detent.controllers.genstepper.motor import Motor
 from detent.controllers.genstepper.pins import AXES, Order
 from detent.controllers.genstepper.prompter import Prompter
+from detent.controllers.genstepper.supply import WINDING_CURRENT
 from detent.controllers.genstepper.windings import CYCLE, Duties
 from detent.controllers.genstepper.windings import drive as winding_drive
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind, PulseOutput
@@ -70,7 +71,7 @@ class Board:
         for motor in self._motors.values():
             motor.reset(now, keep=order.stop_rate, slope=order.ramp, rate=order.run_rate,
                         idle_windings=order.idle_windings)  # fmt: skip
-        half_installed = self._straps[pins.HALF_JUMPER[self.model]] == LOW and not order.dual_baud
+        half_installed = pins.half_installed(self._straps) and not order.dual_baud
         self._half = bool(order.low_power if half_installed else order.high_power)
         self._double = order.double_current or self._straps["R1K"] == LOW
         self._auto = high_byte(order.auto_rate)
@@ -192,6 +193,11 @@ class Board:
         return self._straps
 
     @property
+    def most_current(self) -> float:
+        """Amperes that a winding may draw at the whole supply, by page 7: its pulses halve that at half power."""
+        return WINDING_CURRENT * (2 if self._double else 1) * (2 if self._half else 1)
+
+    @property
     def axes(self) -> Sequence[str]:
         """X and Y."""
         return AXES
@@ -199,7 +205,7 @@ class Board:
     @property
     def line_format(self) -> Format:
         """8N1 at the ordered rate."""
-        return pins.character_format(self._order, self._straps[pins.HALF_JUMPER[self.model]])
+        return pins.character_format(self._order, self._straps)
 
     def status(self, now: Ns, axis: str = "") -> Status:
         """The location of an axis, its steps, and one word: off held starting direct running ready."""

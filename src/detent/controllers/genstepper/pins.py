@@ -57,14 +57,19 @@ _COMMON: tuple[Pin, ...] = (
 _HALF = "low (installed): half power after a reset, or a quarter of the baud rate with DUALBAUD"
 _DOUBLE = Pin("R1K", None, _STRAP, "low (installed): one motor with double current on both connectors")
 
+_FUL = "low (installed): full power after a reset, on artwork GR, which has it beside HLF"
+_EARLY = "low (installed): what HLF does, on artworks before GR"
+
 PINS: Mapping[str, tuple[Pin, ...]] = {
     BS0610: (*_COMMON, Pin("S1K", None, _STRAP, _HALF), _DOUBLE),
-    BS0710: (*_COMMON, Pin("HLF", None, _STRAP, _HALF), _DOUBLE),
-}
-HALF_JUMPER: Mapping[str, str] = {BS0610: "S1K", BS0710: "HLF"}
+    BS0710: (*_COMMON, Pin("HLF", None, _STRAP, _HALF), Pin("FUL", None, _STRAP, _FUL),
+             Pin("S1K", None, _STRAP, _EARLY), _DOUBLE),
+}  # fmt: skip
+HALF_JUMPERS = ("S1K", "HLF")  # one jumper with two names, by artwork (page 67)
 
 DEFAULT_STRAPS: Mapping[str, Mapping[str, Level]] = {
-    model: {"JS": LOW, HALF_JUMPER[model]: HIGH, "R1K": HIGH} for model in PINS
+    model: {pin.name: LOW if pin.name == "JS" else HIGH for pin in table if pin.kind is _STRAP}
+    for model, table in PINS.items()
 }
 
 NO_STEP_CLOCK = PulseOutput({}, 0, HIGH)  # the drivers are on the board: steps leave it as winding currents
@@ -96,9 +101,14 @@ class Order(NamedTuple):
         return self
 
 
-def character_format(order: Order, half_jumper: Level) -> Format:
-    """How characters look on the line: 8N1; with DUALBAUD and its jumper at a quarter of the rate (page 13)."""
-    slow = order.dual_baud and half_jumper == LOW
+def half_installed(straps: Mapping[str, Level]) -> bool:
+    """Whether the half power jumper is installed, under either name."""
+    return any(straps.get(name) == LOW for name in HALF_JUMPERS)
+
+
+def character_format(order: Order, straps: Mapping[str, Level]) -> Format:
+    """Characters on the line: 8N1, at a quarter of the rate with DUALBAUD and the half power jumper (page 13)."""
+    slow = order.dual_baud and half_installed(straps)
     return Format(order.baud // 4 if slow else order.baud, 8, "none", 1)
 
 
@@ -107,4 +117,17 @@ def strap_line(model: str, units: Sequence[tuple[str, Mapping[str, Level]]]) -> 
     if len(units) > 1:
         names = " and ".join(name for name, _ in units)
         raise ValueError(f"{names} cannot share a line: these boards have no addresses, give each a line of its own")
+    for _, named in units:
+        _check_jumpers(named)
     return [{**DEFAULT_STRAPS[model], **named} for _, named in units]
+
+
+def _check_jumpers(named: Mapping[str, Level]) -> None:
+    """Raise ValueError for jumpers that no board has together (page 67)."""
+    if "S1K" in named and named.keys() & {"HLF", "FUL"}:
+        raise ValueError("a BS0710 has S1K, or from artwork GR on HLF in its place: name the one that it has (page 67)")
+    full = named.get("FUL")
+    if full is not None and (full == LOW) == half_installed(named):
+        raise ValueError(
+            "of FUL and HLF exactly one must be installed; on a board without FUL name HLF alone (page 67)"
+        )

@@ -52,6 +52,7 @@ class Sheet(NamedTuple):
     """The answer: currents in A, and what the manual warns of."""
 
     winding_current: float
+    motor_volts: tuple[float, float]  # what the drivers leave of the supply: least, most
     motor_current: tuple[float, float]  # of all motors: absolute, recommended
     logic_current: float
     supply_current: tuple[float, float]  # of the motor supply: with a single one, logic included
@@ -76,7 +77,8 @@ def size(question: Question) -> Sheet:
     logic = LOGIC_CURRENT + question.tap
     single = question.supply == "SS"
     whole = (motors[0] + logic, motors[1] + logic) if single else motors
-    return Sheet(winding, motors, logic, whole, tuple(_warnings(question, winding)))
+    left = max(question.voltage - DRIVER_DROP[1], 0.0), max(question.voltage - DRIVER_DROP[0], 0.0)
+    return Sheet(winding, left, motors, logic, whole, tuple(_warnings(question, winding)))
 
 
 def voltage_for(current: float, resistance: float) -> float:
@@ -111,6 +113,8 @@ def _warnings(question: Question, winding: float) -> Iterator[str]:
         volts = question.logic_voltage
         if volts is None or volts != 5.0:
             yield "5VO needs exactly 5 V at Vc: 6 V damage the board, 4.2 V reset it (pages 63, 66)"
+    if question.voltage <= DRIVER_DROP[1]:
+        yield "the drivers drop 1.1 to 2 V: nothing is left for the motor (page 78)"
     if question.tap > TAP_CURRENT:
         yield "do not take more than 500 mA from the board's 5 V (page 65)"
     elif question.tap > TAP_FAN_CURRENT:
