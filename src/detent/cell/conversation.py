@@ -134,9 +134,10 @@ class Conversation:
             return
         number, found = cell.wiring.line_of[unit], None
         self._close(number)
-        for exchange in self._of_line.get(number, ()):
+        for exchange in reversed(self._of_line.get(number, ())):
             if self._whole(exchange) <= refused.at:
                 found = exchange
+                break
         self.refused.append((cell.wiring.names[unit], refused, found))
         if found is not None:
             found.refused.append(refused)

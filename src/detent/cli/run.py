@@ -237,8 +237,7 @@ class _Course:
             pass  # a board that is deaf after its reset
         while wire.deadline < NEVER and self._step():
             pass
-        after = cell.next_event()
-        if self._until is not None and cell.now >= self._until and after is not None and after > self._until:
+        if self._until is not None and cell.now >= self._until:
             return False
         cell.run_to(cell.now)  # what the script does in this instant comes first
         conversation.scripted = False
