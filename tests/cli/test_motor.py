@@ -137,6 +137,7 @@ def test_pull_in_tells_the_start_stop_speed_and_the_holes_of_resonance(capsys: p
         (["as1010", "--supply", "2"], "2 V cannot drive"),
         (["as1010", "--step", "third"], "no stepping"),
         (["as1010", "--move", "0"], "a whole number, 1 to"),
+        (["as1010", "--move", "10000000"], "judge a shorter one"),
         (["as1010", "--move", "1000.5"], "a whole number, 1 to"),
         (["as1010", "--move", "nan"], "a whole number, 1 to"),
         (["as1010", "--move", "100", "--slew", "nan"], "whole steps/s"),

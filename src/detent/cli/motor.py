@@ -23,6 +23,8 @@ RATES = (25, 50, 100, 250, 500, 750, 1000, 1500, 2000, 2500, 3000, 4000, 5000, 7
 SLEW, RAMP = 1000.0, 50  # of a move, unless given
 VARIANTS = 512
 MOST_STEPS = 100_000_000
+LONGEST = 3_600.0  # s of a move
+SIMULATED = 300.0  # s of one rotor a second, about
 MOST_SIMULATED = 60_000.0  # s of rotors, that nobody asked for: about a quarter of a minute
 
 
@@ -385,6 +387,7 @@ def _judge(
 
     duration = move.train.duration
     assert duration is not None
+    _warn_of_waiting(duration * 1e-9)
     run = simulate(move.train, move.rig, sample=max(duration // 20_000, 1) if plot is not None else None)
     verdict = run.verdict
     loss = diagnose(move.train, move.rig) if verdict.lost else None
@@ -422,6 +425,23 @@ def _judge(
         _print_pull_in(move.found, facts)
     if plot is not None:
         print(f"Wrote {plot}")
+
+
+def _warn_of_waiting(seconds: float) -> None:
+    """Say how long it takes, where that is long. MotorError where nobody would wait."""
+    import sys
+
+    from detent.motors import engine
+    from detent.motors.motor import MotorError
+
+    if seconds > LONGEST:
+        raise MotorError(
+            f"a move of {seconds:.0f} s takes too long to compute, and at constant speed nothing new happens: judge a "
+            f"shorter one, of at most {LONGEST:.0f} s"
+        )
+    wait = seconds / SIMULATED
+    if wait > 4 and engine.fast() and sys.stderr.isatty():
+        print(f"Computing {seconds:.0f} s of motion: about {wait:.0f} s ...", file=sys.stderr)
 
 
 def _line(verdict: "Verdict", rig: "Rig") -> str:

@@ -64,7 +64,8 @@ def _numbers(law: Law, name: str, text: str) -> dict[str, int]:
             raise SettingError(f"{name}={text}: {part!r} is no whole number")
         value = int(part)
         if not setting.low <= value <= setting.high:
-            unit = f" ({setting.title}, {setting.unit}" + (f" / {setting.scale})" if setting.scale > 1 else ")")
+            parts = [setting.title, *([setting.unit] if setting.unit else [])]
+            unit = f" ({', '.join(parts)}" + (f" / {setting.scale})" if setting.scale > 1 else ")")
             raise SettingError(f"{name}={text}: {setting.name} takes {setting.low} to {setting.high}{unit}")
         found[setting.name] = value
     return found
