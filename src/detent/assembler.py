@@ -41,16 +41,18 @@ class ImageError(Exception):
 
 
 class Statement(NamedTuple, Generic[Ins]):
-    """What a source line says: an instruction, or where the next one stands (`origin`).
+    """What a source line says: an instruction, where the next one stands (`origin`), or that a part `ends`.
 
     `label` is the name written for the instruction's address, at `label_offset` in the statement; the
-    instruction then carries any valid address in its place.
+    instruction then carries any valid address in its place. What ends a part where none has begun begins one at the
+    first address.
     """
 
     instruction: Ins | None
     label: str | None = None
     label_offset: int = 0
     origin: int | None = None
+    ends: bool = False
 
 
 class Language(Protocol[Ins]):
@@ -86,7 +88,7 @@ class Language(Protocol[Ins]):
         """The address to which it leads; None if it has no such argument."""
 
     def aimed(self, instruction: Ins, address: int) -> Ins:
-        """The same instruction, leading to `address`."""
+        """The same instruction, leading to `address`. StatementError where it cannot lead there."""
 
     def encode(self, instruction: Ins) -> bytes:
         """Its bytes in memory."""
@@ -165,6 +167,23 @@ class Assembly(Generic[Ins]):
         return tuple(placed.text for placed in self.placed)
 
     @property
+    def typed(self) -> tuple[str, ...]:
+        """`commands`, and where the language has parts the lines between them that say where each one stands.
+
+        Assembled again they give the same bytes at the same addresses.
+        """
+        origin, closing = getattr(self.language, "origin", None), getattr(self.language, "closing", None)
+        lines: list[str] = []
+        here = self.language.areas[0].start
+        for placed in self.placed:
+            if origin is not None and placed.address != here:
+                lines += [closing] if lines and closing is not None else []
+                lines.append(origin(placed.address))
+            lines.append(placed.text)
+            here = placed.address + len(placed.code)
+        return tuple(lines)
+
+    @property
     def used(self) -> int:
         """Bytes that the instructions take."""
         return sum(len(placed.code) for placed in self.placed)
@@ -188,6 +207,11 @@ class Assembly(Generic[Ins]):
             start = placed.address - self.base
             image[start : start + len(placed.code)] = placed.code
         return bytes(image)
+
+    @property
+    def whole(self) -> bytes:
+        """The image from the first address of the program memory on: so it is kept in files, and taken from them."""
+        return bytes([self.language.blank]) * (self.base - self.language.areas[0].start) + self.image
 
 
 class _Line(NamedTuple, Generic[Ins]):
@@ -218,6 +242,8 @@ class _Assembler(Generic[Ins]):
         self.area: range | None = language.areas[0]  # where the present part stands
         self.overflow: tuple[_Line[Ins], range] | None = None  # the first instruction that does not fit
         self.certain = True  # False once addresses are off: a line could not be read, or did not fit
+        self.begun = False  # a part, by an instruction or by where it stands
+        self.ended = 0  # the line that has ended a part, while no other has begun
 
     def run(self) -> Assembly[Ins]:
         """Both passes. Raises AssemblyFailed."""
@@ -258,9 +284,19 @@ class _Assembler(Generic[Ins]):
             hint = f"; if it is a label, write {statement}:" if _WORD.fullmatch(statement) else ""
             self.wrong(number, column + error.offset, error.message + hint)
             return
-        if parsed.origin is not None:
-            self.move_to(parsed.origin, number, column)
+        origin = parsed.origin
+        if parsed.ends and self.begun and not self.ended:
+            self.ended = number
+        elif parsed.ends:
+            origin = self.language.areas[0].start
+        if origin is not None:
+            self.begun, self.ended = True, 0
+            self.move_to(origin, number, column)
         if parsed.instruction is not None:
+            self.begun = True
+            if self.ended:
+                where = f"it stands behind the end of a part, on line {self.ended}, and belongs to none"
+                self.wrong(number, column, f"{where}; say where it stands, or take that line out")
             length = self.language.length(parsed.instruction)
             self.place(_Line(number, column, self.address, parsed, parsed.instruction, length))
 
@@ -342,7 +378,10 @@ class _Assembler(Generic[Ins]):
             behind = f"label {label} stands behind the last instruction, where there is nothing to jump to"
             self.wrong(line.number, column, f"{behind}; put an instruction behind it")
         else:
-            return self.language.aimed(line.instruction, self.symbols[label])
+            try:
+                return self.language.aimed(line.instruction, self.symbols[label])
+            except StatementError as error:
+                self.wrong(line.number, column, f"label {label} stands at {self.symbols[label]}: {error.message}")
         return line.instruction
 
     def similar(self, label: str) -> str:

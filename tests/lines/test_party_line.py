@@ -164,3 +164,48 @@ def test_a_second_controller_follows_the_step_outputs_of_the_first() -> None:
     master, slave = (pair.controller(name).status(pair.now) for name in "XY")
     assert slave.position == master.position != 0
     assert slave.pulses == master.pulses > 5000
+
+
+def test_a_sin_10_that_is_off_signs_on_at_space_and_looks_for_axes_at_an_ampersand() -> None:
+    """Pages 4 and 21: "all (8) switches in off position", SPACE signs on; page 20: "selectable via host commands"."""
+    adapted = cell("[lines.pc]", 'units = ["sin"]', "[lines.bus]", 'units = ["X"]', 'host = "sin"', "[units.sin]",
+                   'model = "sin-10"', names="X")  # fmt: skip
+    assert talk(adapted, b" ") == b"     110 AMS SMC-27X2 V1.10\r\n"
+    assert talk(adapted, b"+30\r") == b"+30\r\n"
+    assert talk(adapted, b"Z\r") == b"Z       30\r\n"
+    assert talk(adapted, b"\x1b") == b"#\r\n"
+    assert talk(adapted, b"&\r", 3) == b"X\r\n"
+    assert talk(adapted, b"XZ;QZ\r") == b"XZ        0\r\n#\r\n"
+    talk(adapted, b"\x03")
+    assert talk(adapted, b"Q ") == b"Q     110 AMS SMC-27X2 V1.10\r\n"
+    assert talk(adapted, b"X\r").endswith(b"n=Q\r\n")
+
+
+def test_a_line_that_is_too_long_for_the_buffer_runs_no_half_of_a_command() -> None:
+    """Page 19: 256 characters."""
+    adapted = sin10()
+    talk(adapted, b"&\r", 3)
+    long = b"XZ;" * 83 + b"X+1000"  # 255
+    assert talk(adapted, long + b"00\r", 10).endswith(b"\r\n#\r\n")
+    assert adapted.controller("X").status(adapted.now).pulses == 0
+    assert talk(adapted, b"X+1" + b"0" * 300 + b"\rX+5\r\rXZ\r", 10) == b"#\r\nX+5\r\nXZ        5\r\n"
+
+
+def test_a_stop_for_one_axis_goes_through_while_the_adapter_waits() -> None:
+    """Pages 19, 28, 33, 57: a program, a 9W, a command in its pending period; the other axis goes on."""
+    adapted = sin10()
+    talk(adapted, b"&\r", 3)
+    talk(adapted, b"XP 0;XM 1000;XL 2048 0;XP;XG;YM 900\r", 2)
+    assert adapted.controller("X").status(adapted.now).state == "running"
+    assert talk(adapted, b"X|\r") == b"X|\r\n"
+    assert [adapted.controller(name).status(adapted.now).state for name in "XY"] == ["ready", "moving"]
+    assert talk(adapted, b"XG\r") == b"XG\r\n"
+    assert talk(adapted, b"9WX;XZ\r", 2) == b""
+    answer = talk(adapted, b"X@\r", 2)
+    assert answer.startswith(b"X@\r\n9WX\r\nXZ")
+    assert talk(adapted, b"X+90000;XR 0;XZ\r", 2) == b"X+90000\r\n"
+    answer = talk(adapted, b"X|\r", 2)
+    assert answer.startswith(b"XR 0#\r\nX|\r\nXZ")
+    assert [adapted.controller(name).status(adapted.now).state for name in "XY"] == ["ready", "moving"]
+    assert talk(adapted, b"XW 65535\r", 2) == b""
+    assert talk(adapted, b"X@\r", 2) == b"XW 65535#\r\nX@\r\n"

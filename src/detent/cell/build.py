@@ -505,7 +505,7 @@ class _Builder:
         programs = {name: self.assembled(name, unit, "program") for name, unit in units.items() if unit.program}
         for name, unit in units.items():
             if unit.eeprom or name in images:
-                image = images[name] if name in images else _whole(self.assembled(name, unit, "eeprom"))
+                image = images[name] if name in images else self.assembled(name, unit, "eeprom").whole
                 try:
                     self.controller(name).restore(image)
                 except ImageError as error:
@@ -566,9 +566,3 @@ class _Builder:
     def need_unit(self, key: str, name: str) -> None:
         if name not in self.description.units:
             raise self.problem(key, str(catalogue.unknown("unit", name, tuple(self.description.units))))
-
-
-def _whole(assembly: Assembly[Any]) -> bytes:
-    """The image from the first address of the program memory on."""
-    language = assembly.language
-    return bytes([language.blank]) * (assembly.base - language.areas[0].start) + assembly.image

@@ -32,7 +32,9 @@ def asm(
     """Assemble a program: labels and comments in, commands or an image out.
 
     The source has one command a line as typed on the wire, `label:` where a jump leads, and `;` before
-    a comment. The commands are printed with their addresses filled in, and how much memory they take.
+    a comment. The commands are printed with their addresses filled in, and how much memory they take; where the
+    controller's programs have places, with the lines that say where each part stands. An image begins at the first
+    address of the program memory.
 
     Parameters
     ----------
@@ -151,12 +153,12 @@ def _formatted(assembly: Assembly[Any], format: str) -> bytes:
     """What a file in `format` holds."""
     match format:
         case "image":
-            return assembly.image
+            return assembly.whole
         case "hex":
-            image = assembly.image
+            image = assembly.whole
             return _lines(image[at : at + 16].hex(" ").upper() for at in range(0, len(image), 16))
         case _:
-            return _lines(assembly.commands)
+            return _lines(assembly.typed)
 
 
 def _lines(texts: Iterable[str]) -> bytes:
@@ -171,7 +173,7 @@ def _facts(assembly: Assembly[Any]) -> dict[str, Any]:
         "bytes_used": assembly.used,
         "capacity": assembly.capacity,
         "labels": dict(assembly.symbols),
-        "image": assembly.image.hex(),
+        "image": assembly.whole.hex(),
         "instructions": [
             {
                 "address": placed.address,

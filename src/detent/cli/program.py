@@ -213,7 +213,7 @@ def _lines(assembly: Assembly[Any]) -> list[str]:
 def _source(language: Language[Any], lines: Sequence[str]) -> str:
     """Source with labels; the lines as they are if this assembler cannot read them."""
     try:
-        return disassemble(language, assemble(language, "\n".join(lines)).image)
+        return disassemble(language, assemble(language, "\n".join(lines)).whole)
     except (AssemblyFailed, ValueError):
         return "".join(f"{line}\n" for line in lines)
 

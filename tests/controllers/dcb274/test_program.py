@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.controllers.dcb274.bench_unit import Bench
 
 from detent.assembler import AssemblyFailed, ImageError, assemble, disassemble
 from detent.controllers.dcb274 import commands, program
@@ -97,3 +98,83 @@ def test_what_is_no_program_is_refused_with_a_reason(source: str, words: str) ->
 def test_what_no_command_gives_is_no_image(image: bytes) -> None:
     with pytest.raises(ImageError):
         disassemble(program.language(), image)
+
+
+def sources() -> st.SearchStrategy[str]:
+    """Programs in one place or several, written as people write them."""
+    parts = st.lists(
+        st.tuples(st.sampled_from(["", "P 0", "P 100", "P 128", "P 300", "P 1600"]), st.lists(stored(), max_size=5),
+                  st.booleans()),
+        min_size=1, max_size=4, unique_by=lambda part: part[0],
+    )  # fmt: skip
+
+    def written(found: list[tuple[str, list[Instruction], bool]]) -> str:
+        lines: list[str] = []
+        for start, instructions, ended in found:
+            if start or not lines:
+                lines += [start] if start else []
+                lines += map(commands.spell, instructions)
+                lines += ["P"] if ended and (start or instructions) else []
+        return "\n".join(lines)
+
+    return parts.map(written)
+
+
+@given(source=sources())
+def test_what_is_printed_is_taken_back_at_the_same_addresses(source: str) -> None:
+    """Page 47: P says where a program stands. Listing, commands, image and disassembly: one program."""
+    language = program.language()
+    try:
+        made = assemble(language, source)
+    except AssemblyFailed:
+        return  # parts that lie on each other, or reach into the parameters
+    again = assemble(language, "\n".join(made.typed))
+    assert [(p.address, p.code) for p in sorted(again.placed)] == [(p.address, p.code) for p in sorted(made.placed)]
+    assert again.whole == made.whole
+    back = assemble(language, disassemble(language, made.whole))
+    assert (back.whole, back.base) == (made.whole, made.base) or not made.placed
+    for each in made.placed:
+        assert made.whole[each.address : each.address + len(each.code)] == each.code
+
+
+def test_the_commands_of_parts_are_those_that_a_terminal_takes() -> None:
+    """Page 47: the second P ends program mode, and the next one begins it elsewhere."""
+    made = assemble(program.language(), "A 8\nP\nP 128\nt: A 16\nP\nP 300\nT 50 t\n")
+    assert made.typed == ("A 8", "P", "P 128", "A 16", "P", "P 300", "T 50 128")
+    assert assemble(program.language(), "P 128\nA 8").typed == ("P 128", "A 8")
+
+
+@pytest.mark.parametrize(
+    ("source", "line"),
+    [("z: A 8\nT 5 z", 2), ("T 5 far\nP 300\nfar: A 8", 1), ("T 5 256", 1), ("T 5 200", 1)],
+)
+def test_a_trip_routine_that_stands_where_no_trip_finds_it_is_refused_with_its_line(source: str, line: int) -> None:
+    """Page 49: "the specified address between 1 and 255"; "use 0 (zero) as the address parameter" turns it off."""
+    with pytest.raises(AssemblyFailed) as failed:
+        assemble(program.language(), source)
+    (error,) = failed.value.errors
+    assert error.line == line
+    assert "1 to 192" in error.message or "0 to 192" in error.message
+
+
+def test_an_instruction_behind_the_closing_p_belongs_to_no_program() -> None:
+    """Page 47: the second P returns to command mode, where it would be executed at once."""
+    language = program.language()
+    with pytest.raises(AssemblyFailed, match=r"program:4:1.*behind the end of a part, on line 3"):
+        assemble(language, "P 0\nA 8\nP\nA 16")
+    assert assemble(language, "P\nA 8\nP\nP 2\nA 16").commands == ("A 8", "A 16")
+
+
+@given(stored())
+def test_a_unit_lists_and_stores_again_what_it_holds(instruction: Instruction) -> None:
+    """Pages 47 and 48: program mode and Q."""
+    text = commands.spell(instruction)
+    if len(text) > 15:
+        return
+    bench = Bench(execution_times=False)
+    bench.do("P 300", text, "P", wait=5_000_000)
+    code = bench.unit.memory.read(300, 6)
+    listed = bench.do("Q 300", wait=5_000_000).split("\r\n")
+    assert listed[1] == f"300 {text}"
+    bench.do("P 300", listed[1].partition(" ")[2], "P", wait=5_000_000)
+    assert bench.unit.memory.read(300, 6) == code

@@ -70,8 +70,9 @@ class SmcLanguage:
     """The SMC-27X2 as the assembler sees it (`detent.assembler.Language`).
 
     Source is what goes on the wire, one command a line, with labels for the addresses of G, J, L and T (``J start 3``,
-    ``T 1000 trip``). ``P 128`` says where the next instruction stands, as it does in program mode; ``P`` with
-    anything behind a program (and ``P`` alone) writes the end mark FFh, as it does there.
+    ``T 1000 trip``). ``P 128`` says where the next instruction stands, as it does in program mode; ``P`` alone ends a
+    program by the end mark FFh, as it does there, and an instruction behind it needs another ``P n`` first: on the
+    wire it would be executed at once. A source that begins with an instruction stands at 0.
     """
 
     model: str = MODEL
@@ -79,6 +80,7 @@ class SmcLanguage:
     areas: tuple[range, ...] = AREAS
     blank: int = END
     closed: bool = False
+    closing: str = "P"
 
     def parse(self, text: str) -> Statement[Instruction]:
         """The statement in `text`; see `detent.assembler.Language`."""
@@ -105,7 +107,7 @@ class SmcLanguage:
         except Refusal as error:
             raise StatementError(str(error)) from error
         if text.strip() == "P":
-            return Statement(None)  # bytes between parts of a program are FFh, and so is the one behind it
+            return Statement(None, ends=True)  # bytes between parts are FFh, and so is the one behind a program
         return Statement(None, origin=values[0])
 
     def _without_label(self, text: str) -> tuple[str, str | None, int]:
@@ -137,6 +139,14 @@ class SmcLanguage:
         """The same instruction, leading to `address`."""
         place = self._place(instruction)
         assert place is not None
+        argument = ROWS[instruction.op].arguments[place]
+        if instruction.op is Op.TRIP and (address == 0 or argument.read(address) is None):
+            why = "0 turns it off" if address == 0 else "its vector is a byte"
+            raise StatementError(
+                f"T calls a routine at 1 to 192, as {why} (page 49); put the routine there, like P 128"
+            )
+        if argument.read(address) is None:
+            raise StatementError(f"{instruction.op.value} leads to {argument.words}")
         values = list(instruction.values)
         values[place] = address
         return instruction._replace(values=tuple(values))
