@@ -21,6 +21,7 @@ from detent.ticks import MS, SECOND, Ns
 LONGEST = 64  # steps of a run: looking further ahead costs more than it saves where a commit cuts runs anyway
 NOWHERE = -(1 << 62)  # before everything: the first run gets a base of its own
 SETTLED: Ns = 20 * MS  # a rest longer than the lag by this takes it back to 0
+BATCH: WallNs = 2 * MS  # pulses are sent no more often than so, while there is time
 SPARE = 4  # entries of the move queue that are left to outputs
 
 
@@ -72,6 +73,7 @@ class Stepper:
         self._told = 0  # the shaft behind every pulse told of, with those of an open train as sent
         self._sent = 0
         self._lag = 0  # ticks
+        self._sent_at: WallNs = 0
         self._not_before = NOWHERE  # no pulse up to this tick: a stop is not in force yet
         self._halted = True  # nothing is sent before `adopt` or `rewind`
         self._regaining = False
@@ -259,8 +261,12 @@ class Stepper:
         now = core.clock.tick_at(wall)
         room = core.queue.room(now - core.ticks(UNSURE)) - SPARE
         due = runs.due()
-        if 2 * room < core.queue.size and due is not None and due - now > core.ticks(core.setup.lead) // 2:
-            return  # the queue is filling up: what waits a little makes longer runs
+        assert due is not None
+        if due - now > core.ticks(core.setup.lead) // 2 and (
+            wall - self._sent_at < BATCH or 2 * room < core.queue.size
+        ):
+            return  # what waits a little makes longer runs, and there is time
+        self._sent_at = wall
         while span.next <= upto and room > 0:
             run = runs.one(upto)
             self._put(channel, run, up)
