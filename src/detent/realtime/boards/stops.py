@@ -138,7 +138,7 @@ class Stop:
         self._axis.not_before(clock + verdict)
 
     def _listen_anew(self, wall: WallNs) -> None:
-        """A report of the trigger before may be on its way still: only behind the answer to this they are of this one."""
+        """A report of the trigger before may still be on its way: behind the answer to this they are of this one."""
         self._deaf += 1
         number = self._deaf
 
