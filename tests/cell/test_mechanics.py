@@ -44,6 +44,16 @@ def cell(text: str, program: str = "", *, record: bool = True) -> Cell:
     return build(parse(text, "cell.toml"), lambda _: program, record=record, line_timing=False)
 
 
+def with_files(text: str, files: dict[str, str]) -> Cell:
+    def read(name: str) -> str:
+        try:
+            return files[name]
+        except KeyError:
+            raise FileNotFoundError(2, "No such file or directory") from None
+
+    return build(parse(text, "cell.toml"), read, line_timing=False)
+
+
 def example(name: str, **replaced: str) -> Cell:
     folder = EXAMPLES / name
     text = (folder / "cell.toml").read_text()
@@ -331,3 +341,22 @@ class TestWhatHangsOnIt:
         with pytest.raises(Problem, match=words) as caught:
             cell(self.CELL + more + "\n")
         assert str(caught.value).startswith("cell.toml: motors.slide")
+
+    OWN = "resistance = 1.1\ninductance = 3.6e-3\ncurrent = 2.8\ntorque = 1.26\ninertia = 3e-5\nwiring = 'series'\n"
+
+    def test_a_motor_may_be_a_file_with_its_curve(self) -> None:
+        text = self.CELL.replace("qsh4218-41-10-035", "parts/my.toml").replace("= 24", "= 48")
+        curve = "[curve]\nfile = 'my.csv'\nsupply = 48\n"
+        files = {
+            "parts/my.toml": self.OWN + curve,
+            "parts/my.csv": "rpm, Ncm\n75,110\n300,105\n900,85\n1500,55\n",
+        }
+        rig = motor(with_files(text, files)).rig
+        assert rig.motor.holding_torque == 1.26
+        assert rig.motor.inductance_factor > 1.1
+        assert motor(with_files(text + 'wiring = "parallel"\n', files)).rig.motor.current == pytest.approx(5.6)
+        for wrong, words in (({}, "cannot read parts/my.toml"), ({"parts/my.toml": "resistance = 1"}, "missing"),
+                             ({"parts/my.toml": self.OWN + curve}, "or its curve")):  # fmt: skip
+            with pytest.raises(Problem, match=words) as caught:
+                with_files(text, wrong)
+            assert str(caught.value).startswith("cell.toml: motors.slide.motor")

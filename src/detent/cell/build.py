@@ -12,7 +12,7 @@ from detent.cell.cell import Cell
 from detent.cell.deeds import Action, Power, SetSwitch, Type
 from detent.cell.delivery import Store, Typed, no_store, nobody_asks
 from detent.cell.description import Description, Motor, Problem, ScriptEntry, Unit
-from detent.cell.fitting import check_names, mechanics, motors_by_axis, split_axis
+from detent.cell.fitting import check_names, mechanics, motors_by_axis, split_axis, with_own_motors
 from detent.cell.mechanics import Mechanics
 from detent.cell.parts import PARTS, Part
 from detent.cell.switches import AxisSwitch, Switch
@@ -65,7 +65,7 @@ class _End(NamedTuple):
 
 class _Builder:
     def __init__(self, description: Description, read: Read) -> None:
-        self.description, self.read = description, read
+        self.description, self.read = with_own_motors(description, read), read
         self.models: dict[str, Model | Part] = {}
         self.names: list[str] = []
         self.parts: list[Device] = []

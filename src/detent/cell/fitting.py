@@ -1,6 +1,6 @@
 """Motors fitted to a cell: from ``[motors.NAME]`` and the switches on its axis to a `Mechanics`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields, replace
 from difflib import get_close_matches
 from math import inf, pi
@@ -9,6 +9,7 @@ from typing import Any
 from detent.cell.contacts import PINS, Contact, Detector
 from detent.cell.description import Current, Description, Motor, Problem, Switch
 from detent.cell.mechanics import Mechanics
+from detent.motors import own
 from detent.motors.damping import Damping, given
 from detent.motors.drive import Currents, Drive
 from detent.motors.drives import drive as by_name
@@ -68,6 +69,34 @@ def mechanics(
                          detector=detector, record=record, step=step)  # fmt: skip
     except MotorError as error:
         raise Problem(description.file, f"motors.{name}", str(error)) from None
+
+
+def with_own_motors(description: Description, read: Callable[[str], str]) -> Description:
+    """The description with the data of motors that are files (motor = "my.toml") in place of their names.
+
+    A curve that such a file names is read, too, and the motor fitted to it. Raises Problem.
+    """
+    files = {name: entry for name, entry in description.motors.items() if entry.motor.endswith(".toml")}
+    motors = dict(description.motors)
+    for name, entry in files.items():
+        try:
+            motors[name] = entry.model_copy(update={"motor": "", "data": {**_data_of(entry.motor, read), **entry.data}})
+        except (MotorError, OSError, UnicodeDecodeError) as error:
+            what = str(error) if isinstance(error, MotorError) else f"cannot read {entry.motor} or its curve: {error}"
+            raise Problem(description.file, f"motors.{name}.motor", what) from None
+    return description.model_copy(update={"motors": motors}) if files else description
+
+
+def _data_of(file: str, read: Callable[[str], str]) -> dict[str, Any]:
+    found, curve = own.read(read(file), file)
+    if curve is not None:
+        points = curve.points
+        if curve.file:
+            beside = "/".join([*file.split("/")[:-1], curve.file])
+            points = own.read_curve(read(beside), beside, step=curve.step, steps=found.steps)
+        found = curve.fit(found, points).motor
+    names = [field.name for field in fields(Rated) if field.name not in ("name", "title", "source")]
+    return {name: value for name in names if (value := getattr(found, name)) not in (None, "")}
 
 
 def rated(name: str, entry: Motor) -> Rated:
