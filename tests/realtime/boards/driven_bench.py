@@ -54,11 +54,12 @@ class Bench:
         jitter: Callable[[], Ns] = lambda: 0,
         port: Mapping[str, Any] | None = None,
         board: Mapping[str, Any] | None = None,
+        read: Callable[[str], str] = no_file,
     ) -> None:
         self.wall = 1_000 * SECOND
         self._jitter, self._until = jitter, self.wall
         described = parse(text, "cell.toml")
-        trial = build(described, no_file, record=False)
+        trial = build(described, read, record=False)
         self.plan = plan(described, trial.controllers())
         self.machines: dict[str, Machine] = {}
         self.ports: dict[str, FakePort] = {}
@@ -76,7 +77,7 @@ class Bench:
         levels = make_ready(self.boards, self.plan, lambda: self.wall, self._sleep)
         self.stores = HeldStores(store)
         given = {self.plan.inputs[name]: level for name, level in levels.items()}
-        self.cell: Cell = build(described, no_file, store=self.stores.save, line_timing=line_timing, inputs=given)
+        self.cell: Cell = build(described, read, store=self.stores.save, line_timing=line_timing, inputs=given)
         self.news: list[News] = []
         self.driven = Driven(
             self.cell, self.boards, self.plan, self.stores, wall=lambda: self.wall, tell=self.news.append

@@ -437,13 +437,21 @@ class Driven:
         if not self.past.reaches(at):
             at = self.past.moments[0].now if self.past.moments else self.cell.now
         at = min(at, self.cell.now)
-        behind = at + self.plan.lead + axle.stepper.lag + CERTAIN + self._align
-        early = [
-            (when, set_) for when, set_, told in self._reports if when > at and told <= behind and set_.unit == unit
-        ]
+        # what the machine's other inputs are at was so at the stop already: motors stand, and reports take their time
+        others = {name: int(found) for name, found in event.levels.items() if name != event.input}
+        late = {self.plan.inputs[name] for name in others}
+        fresh = {(set_.unit, set_.pin) for when, set_, _ in self._reports if when > at}
+        deeds: list[Deed] = []
+        for name, found in others.items():
+            place = self.plan.inputs[name]
+            if place in fresh or self._given[name] != found:
+                deeds.append(SetPin(*place, found))
+                self._raw[name] = self._given[name] = found
         level = int(event.level)
-        deeds: list[Deed] = [*(set_ for _, set_ in early), SetPin(unit, pin, level)]
-        self._take_back(axle, at, deeds, lambda action: (action.at, action.deed) in early, event.shaft)
+        deeds.append(SetPin(unit, pin, level))
+        drop = {(when, set_) for when, set_, _ in self._reports if when > at and (set_.unit, set_.pin) in late}
+        self._reports = deque((item for item in self._reports if item[:2] not in drop), maxlen=256)
+        self._take_back(axle, at, deeds, lambda action: (action.at, action.deed) in drop, event.shaft)
         self._raw[event.input], self._given[event.input] = int(event.present), level
         if int(event.present) != level:
             self._give(event.input, int(event.present), self.clock())

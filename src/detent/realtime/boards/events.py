@@ -1,6 +1,7 @@
 """What comes back from boards, in the order in which it became known."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
 from detent.ticks import Ns
@@ -32,7 +33,8 @@ class Stopped(NamedTuple):
 
     `at` is the cell time of the stop (its tick, less lead and lag): no pulse came behind it, and all before it came.
     `edge` is that of the first sample which showed the level. `shaft` is the firmware's count as a shaft position.
-    `present` is the level of the input when it was asked for afterwards: a glitch may be over.
+    `present` is the level of the input when it was asked for afterwards: a glitch may be over. `levels` are those of
+    every input that may stop this stepper, asked for together: while it stands, what follows it stands as well.
     """
 
     board: str
@@ -43,6 +45,7 @@ class Stopped(NamedTuple):
     edge: Ns
     shaft: int
     present: bool
+    levels: Mapping[str, bool] = MappingProxyType({})
 
 
 class Slipped(NamedTuple):

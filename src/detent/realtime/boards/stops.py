@@ -41,6 +41,7 @@ class Stop:
         self._core, self._axis, self._read = core, stepper, read
         self._inputs = {name: _Watched(*found, n) for n, (name, found) in enumerate(inputs.items(), 1)}
         self._armed: dict[str, bool] = {}
+        self._levels: dict[str, bool] = {}  # for which each was armed last
         self._changes: list[tuple[dict[str, bool], Ns]] = []  # wanted, and not sent yet
         self.clear()
 
@@ -126,6 +127,7 @@ class Stop:
 
     def _on(self, watched: _Watched, level: bool, at: Ns, wall: WallNs) -> None:
         core, setup = self._core, watched.setup
+        self._levels[setup.name] = level
         sample = core.ticks(setup.sample)
         # its verdict on the level is there before the first pulse
         verdict = sample * setup.samples
@@ -191,7 +193,8 @@ class Stop:
         lag = self._axis.lag_ticks
         self._axis.halt()
         name = watched.setup.name if watched is not None else ""
-        level = self._armed.get(name, True)
+        level = self._levels.get(name, True)
+        levels: dict[str, bool] = {}
         self._firing = Stopped(core.setup.name, self.stepper, name, level, 0, 0, 0, level)
         self._changes.clear()
         for other in self._armed:
@@ -204,20 +207,23 @@ class Stop:
             waiting.discard((message.name, message.number("oid")))
             if message.name == "stepper_position":
                 self._axis.position(message)
-            elif watched is not None and self._firing is not None:
-                sample = core.ticks(watched.setup.sample)
-                edge = core.whole(message, "next_clock", at) - sample
-                stop = edge + (watched.setup.samples - 1) * sample
-                present = bool(message.number("pin_value")) is not watched.setup.pin.active_low
-                self._firing = self._firing._replace(at=scale.time(stop), edge=scale.time(edge), present=present)
-                self._read(name, present, at)
+            else:
+                asked = next(one for one in self._inputs.values() if one.oid == message.number("oid"))
+                present = bool(message.number("pin_value")) is not asked.setup.pin.active_low
+                levels[asked.setup.name] = present
+                self._read(asked.setup.name, present, at)
+                if asked is watched and self._firing is not None:
+                    sample = core.ticks(asked.setup.sample)
+                    edge = core.whole(message, "next_clock", at) - sample
+                    stop = edge + (asked.setup.samples - 1) * sample
+                    self._firing = self._firing._replace(at=scale.time(stop), edge=scale.time(edge), present=present)
             if not waiting and self._firing is not None:
-                core.events.append(self._firing._replace(shaft=self._axis.counted()))
+                core.events.append(self._firing._replace(shaft=self._axis.counted(), levels=levels))
                 self._firing = None
                 self._quiet()
 
         for oid in self._axis.oids:
             core.ask("stepper_get_position", "stepper_position", came, wall, oid=oid)
-        if watched is not None:
-            waiting.add(("endstop_state", watched.oid))
-            core.ask("endstop_query_state", "endstop_state", came, wall, oid=watched.oid)
+        for one in self._inputs.values():
+            waiting.add(("endstop_state", one.oid))
+            core.ask("endstop_query_state", "endstop_state", came, wall, oid=one.oid)
