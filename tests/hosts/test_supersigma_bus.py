@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.hosts.test_supersigma_cells import positions, robot
 
-from detent.hosts.errors import MotionFailed
+from detent.cell.breakage import OnLine
+from detent.hosts.errors import DriverError, MotionFailed
 from detent.hosts.supersigma import BlockingCcu, BlockingSupersigma, Ccu, Supersigma
+from detent.lines.faults import UNITS, LostCharacters
 from detent.ticks import MS, SECOND, US
 
 GARBAGE = st.lists(st.sampled_from([0, 1, 2, 3, 5, 0x81, 0x83, 0xFF]) | st.integers(0, 255), max_size=9).map(bytes)
@@ -116,3 +118,25 @@ def test_a_limit_is_kept_below_the_lowest_speed_of_the_ramps_too(limit: int, fas
     (span,) = cell.recording.motion("m1", cell.now)
     times = span.train.times(1, 500)
     assert (times[1:] - times[:-1]).min() >= SECOND / fastest * 0.999
+
+
+@pytest.mark.parametrize("nth", range(1, 25))
+def test_a_byte_that_is_lost_is_told_or_made_good(nth: int) -> None:
+    """A movement that came to be another is not taken for the one that was told."""
+    cell, port = robot(switches=False)
+    drive = BlockingSupersigma(Supersigma(1), port)
+    cell.breaks(OnLine(0, LostCharacters(UNITS, nth=nth)))
+    made = 0
+    for steps in (257, -60):
+        try:
+            drive.move(steps)
+            drive.wait()
+        except DriverError:
+            break
+        made += steps
+        assert positions(cell)[0] == made
+    drive.stop()
+    cell.run_to(cell.now + SECOND)
+    stood = positions(cell)
+    cell.run_to(cell.now + 10 * SECOND)
+    assert positions(cell) == stood

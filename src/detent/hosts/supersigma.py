@@ -59,6 +59,7 @@ class Supersigma(Axis, BusDriver):
         self._direction = 0  # of that movement; 0: there is none
         self._last = 0  # direction of the last movement
         self._originating = False
+        self._wanted: int | None = None  # steps of the movement under way, as long as nobody stops it
 
     # -- the drive's own commands ------------------------------------------------------------------------
 
@@ -94,11 +95,12 @@ class Supersigma(Axis, BusDriver):
     def originate(self) -> Steps[None]:
         """Begin the search for the origin, backward to the end of the rail. It is position 0. Raises Busy."""
         yield from self._begin(message(self.drive, ORIGINATE), -1)
-        self._originating = True
+        self._originating, self._wanted = True, None
 
     @operation
     def emergency(self) -> Steps[None]:
         """Stop by the steepest ramp. Raises NoAnswer if the drive does not tell that it heard it."""
+        self._wanted = None
         yield from self._stopped(self.drive, EMERGENCY)
 
     def _begin(self, data: bytes, steps: int) -> Steps[None]:
@@ -107,7 +109,7 @@ class Supersigma(Axis, BusDriver):
             raise self._busy()
         yield Ask(data)
         self._direction = self._last = 1 if steps > 0 else -1
-        self._originating = False
+        self._originating, self._wanted = False, abs(steps)
 
     def _busy(self) -> Busy:
         return Busy(self.title, "moves: wait() for its end, or stop() it")
@@ -142,6 +144,7 @@ class Supersigma(Axis, BusDriver):
     @operation
     def stop(self) -> Steps[None]:
         """Stop through the ramp. Raises NoAnswer if the drive does not tell that it heard it."""
+        self._wanted = None
         yield from self._stopped(self.drive, STOP)
 
     @operation
@@ -201,11 +204,15 @@ class Supersigma(Axis, BusDriver):
 
     @operation
     def wait(self, timeout: float | None = None) -> Steps[None]:
-        """Wait until the drive stands. Raises DriveFailed for an emergency, a refusal, an origin that was not found."""
+        """Wait until the drive stands.
+
+        Raises DriveFailed for an emergency, a refusal, an origin that was not found, other steps than were told.
+        """
         yield from super().wait(timeout)
         report = yield from self.status()
         originating, self._originating = self._originating, False
-        _check(self.drive, report)
+        wanted, self._wanted = self._wanted, None
+        _check(self.drive, report, wanted)
         if originating and not report.originated:
             raise DriveFailed(self.drive, "found no origin", report)
 
@@ -279,7 +286,7 @@ class Ccu(BusDriver):
     @operation
     def move_all(self, steps: Mapping[int, int], *, limit: int | None = None) -> Steps[dict[int, Report]]:
         """Move several drives at once, each as fast as it can, and wait until all have arrived."""
-        return (yield from self._all(steps, lambda drive: _move(drive, steps[drive], limit)))
+        return self._made((yield from self._all(steps, lambda drive: _move(drive, steps[drive], limit))), steps)
 
     @operation
     def originate_all(self, drives: Iterable[int]) -> Steps[dict[int, Report]]:
@@ -315,9 +322,9 @@ class Ccu(BusDriver):
         try:
             if limit > LOW:
                 yield Ask(b"".join(message(drive, LIMIT, steps[drive], limit) for drive in drives))
+                self._made((yield from self.wait_for(*drives)), steps)
             else:
                 yield from self._follow(drives, line([steps[drive] for drive in drives], fastest))
-            yield from self.wait_for(*drives)
         except DriverError:
             for drive in drives:
                 yield from attempt(self._stopped(drive, STOP))
@@ -331,19 +338,24 @@ class Ccu(BusDriver):
         # one write, so that the drives start one message apart, as the line is reckoned
         yield Ask(b"".join(commands[:first]))
         self._at += first * MESSAGE / CLOCK_HZ
+        made = {run.axis: abs(run.steps) for run in runs[:first]}
         for run, command in zip(runs[first:], commands[first:], strict=True):
             yield Rest(max(began + (run.at - EXCHANGE) / CLOCK_HZ - self._at, 0.0))
-            yield from self._ended(drives[run.axis])
+            yield from self._ended(drives[run.axis], made[run.axis])
             yield Ask(command)
+            made[run.axis] = abs(run.steps)
             _check(drives[runs[0].axis], (yield from self._status(drives[runs[0].axis])))
         yield Rest(max(began + max((run.end for run in runs), default=0) / CLOCK_HZ - self._at, 0.0))
+        for axis, steps in made.items():
+            yield from self._ended(drives[axis], steps)
 
-    def _ended(self, drive: int) -> Steps[None]:
+    def _ended(self, drive: int, steps: int) -> Steps[None]:
         """See that the movement of a drive has ended, which it should have by now. Raises DriveFailed."""
         for _ in range(AWAITED):
             report = yield from self._status(drive)
             _check(drive, report)
             if not report.moving:
+                _check(drive, report, steps)
                 return
         raise DriveFailed(drive, "still moves: its clock is not that of the other drives", report)
 
@@ -356,6 +368,12 @@ class Ccu(BusDriver):
             yield Ask(one)
         return (yield from self.wait_for(*drives))
 
+    def _made(self, reports: Mapping[int, Report], steps: Mapping[int, int]) -> dict[int, Report]:
+        """`reports`, if every drive has made its steps. Raises DriveFailed."""
+        for drive, report in reports.items():
+            _check(drive, report, abs(steps[drive]))
+        return dict(reports)
+
 
 def _move(drive: int, steps: int, limit: int | None) -> bytes:
     """The message of a movement at no more than `limit`: below where ramps begin that is constant speed."""
@@ -364,14 +382,18 @@ def _move(drive: int, steps: int, limit: int | None) -> bytes:
     return message(drive, CONSTANT if limit < LOW else LIMIT, steps, limit)
 
 
-def _check(drive: int, report: Report) -> None:
-    """Raise DriveFailed for an emergency or a refused command."""
+def _check(drive: int, report: Report, steps: int | None = None) -> None:
+    """Raise DriveFailed for an emergency or a refused command, and for other `steps` made than were told."""
     if report.end_of_rail:
         raise DriveFailed(drive, f"met the end of its rail after {report.steps} steps", report)
     if report.excessive_force:
         raise DriveFailed(drive, f"met excessive force after {report.steps} steps", report)
     if report.refused:
         raise DriveFailed(drive, "refused a command", report)
+    if steps is not None and report.steps != steps:
+        raise DriveFailed(
+            drive, f"made {report.steps} of {steps} steps: a message was lost or damaged on the bus", report
+        )
 
 
 class BlockingSupersigma(Blocking, Supersigma):
