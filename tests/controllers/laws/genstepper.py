@@ -183,7 +183,9 @@ class Board:
 
         def closed(bench: Bench) -> bool:  # in E mode a soft limit is ignored (page 26)
             ignored = not self._hard and bench.device.status(bench.now).state == "direct"
-            return bench.level(pin) == LOW and not ignored
+            mask = bench.device._limits._mask  # type: ignore[attr-defined]  # what a T in garbage chose (page 34)
+            blocked, inverted = mask >> LIMITS.index(pin) & 1, mask >> 4 + LIMITS.index(pin) & 1
+            return bench.level(pin) == (HIGH if inverted else LOW) and not ignored and not blocked
 
         return Limit(pin, axis, direction, closed, steps)
 
