@@ -518,3 +518,26 @@ def test_every_call_signs_on_by_itself(call: Callable[[BlockingDcb274], object])
     _, unit = alone()
     call(unit)
     assert unit.name == "A"
+
+
+def test_program_mode_that_was_left_open_is_ended_by_a_line() -> None:
+    """Page 47: "entering the second P command will terminate the PROGRAM mode"; each call may be another host's."""
+    cell, unit = alone()
+    unit.command("P 300")
+    other = BlockingDcb274(Dcb274(), HostPort(cell))
+    assert other.command("A 8") == ""
+    third = BlockingDcb274(Dcb274(), HostPort(cell))
+    assert third.command("P") == ""
+    assert third.read_program(300) == ["P 300", "A 8"]
+
+
+def test_esc_before_the_sign_on_is_obeyed_and_no_failure() -> None:
+    """Pages 31 and 33: a program at 1600 runs, and nobody has typed SPACE."""
+    cell, unit = alone()
+    unit.write_program(["M 1000", "L 2048 0"], 1600)
+    unit.reset()
+    other = BlockingDcb274(Dcb274(), HostPort(cell))
+    other.port.wait(0.5)
+    assert cell.controllers()["unit"].status(cell.now).state == "running"
+    other.abort()
+    assert cell.controllers()["unit"].status(cell.now).state == "ready"

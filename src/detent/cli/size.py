@@ -200,14 +200,17 @@ def _dcb274(given: Mapping[str, Any]) -> Answer:
     from detent.controllers.dcb274.sizing import MORE, MOST_SUPPLY, advise
 
     found = advise(**given)
+    enough = found.least_supply <= MOST_SUPPLY
+    supply = (
+        f"{found.least_supply:.3g} to {MOST_SUPPLY:g} V" if enough else f"at most {MOST_SUPPLY:g} V, too little here"
+    )
     amps = FULL_CURRENT * found.run / 100
     lines = [
         Line("hold and run current", f"Y {found.hold} {found.run}: {FULL_CURRENT * found.hold / 100:.3g} and "
              f"{amps:.3g} A a phase, 100 is {FULL_CURRENT:g} A; hold begins 1 s behind a move (page 52)"),
         Line("the right run current", f"the least that works reliably (page 62), and {(MORE[0] - 1) * 100:.0f} to "
              f"{(MORE[1] - 1) * 100:.0f} % more (page 64)"),
-        Line("supply", f"{found.least_supply:.3g} to {MOST_SUPPLY:g} V, unregulated; the higher the faster "
-             "(pages 11, 13, 64; page 2 prints 45 V)"),
+        Line("supply", f"{supply}, unregulated; the higher the faster (pages 11, 13, 64; page 2 prints 45 V)"),
         Line("heat of the windings", f"{found.watts:.3g} W at run current"),
         Line("decay", f"b {found.decay}: fast above {found.steps_per_s} steps/s, slow below and at rest (page 36)"),
         Line("slow decay", "smooth, less resonance, less heat; poor regulation of low currents (pages 36, 65)"),

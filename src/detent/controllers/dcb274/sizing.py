@@ -6,6 +6,7 @@ from detent.controllers.dcb274 import settings
 from detent.controllers.dcb274.current import FULL_CURRENT, threshold
 
 LEAST_SUPPLY: Final = 24.0  # V (page 13)
+OPERATES_FROM: Final = 12.0  # V (page 4)
 MOST_SUPPLY: Final = 40.0
 MOST_POWER: Final = 100.0  # VA (page 52)
 RATED_TIMES: Final = 2.0  # "2 times the winding rating" is the least supply (page 64)
@@ -52,10 +53,17 @@ def advise(
         warnings.append(f"{asked:g} A is more than the {FULL_CURRENT:g} A of Y 100 (page 52)")
     if supply > MOST_SUPPLY:
         warnings.append(f"{supply:g} V: the supply must never exceed {MOST_SUPPLY:g} V (pages 11, 13)")
+    elif supply < OPERATES_FROM:
+        warnings.append(
+            f"{supply:g} V: it operates from {OPERATES_FROM:g} V on, and should have {LEAST_SUPPLY:g} V (page 4)"
+        )
     elif supply < LEAST_SUPPLY:
         warnings.append(f"{supply:g} V: below {LEAST_SUPPLY:g} V it runs, from 12 V on; the manual "
                         "advises against it: lower performance, more supply current (page 4)")  # fmt: skip
-    if supply < RATED_TIMES * volts:
+    if least > MOST_SUPPLY:
+        warnings.append(f"no supply that the drive takes is twice the {volts:.3g} V of the winding (page 64): "
+                        "connect the coils in parallel, or take half of each winding (pages 63, 64)")  # fmt: skip
+    elif supply < RATED_TIMES * volts:
         warnings.append(f"the least supply is twice the {volts:.3g} V of the winding (page 64)")
     if watts > MOST_POWER:
         warnings.append(f"{watts:.3g} W in the windings: the drive gives at most {MOST_POWER:g} VA (page 52)")

@@ -98,13 +98,15 @@ class Handshake(Driver):
 class SingleMode(Handshake):
     """One axis on the line, signed on with SPACE. Characters are echoed, CR is not; the answer ends in CR LF.
 
-    `printed` are the lines that programs have printed and nobody has taken yet, `examined` what X said at sign-on.
+    `printed` are the lines that programs have printed and nobody has taken yet, `examined` what X said at sign-on,
+    `programming` whether the unit was found storing what it is sent: somebody has begun a program (page 47).
     """
 
     def __init__(self, patience: float) -> None:
         super().__init__("", patience)
         self.printed: list[str] = []
         self.examined = ""
+        self.programming = False
         self._typed = False  # a line went unanswered
 
     def connect(self) -> Steps[str]:
@@ -132,7 +134,9 @@ class SingleMode(Handshake):
         self.examined = yield from self._among_reports("X")
         if self.examined == "#":
             what = "is in program mode, where lines are stored: abort() leaves it"
+            self.programming = True
             raise Refused(self.title, what, Spoken(b"X\r", b"X#\r\n"), "#")
+        self.programming = False
         yield from self.reports_off()
         return version.group().decode() if version else ""
 

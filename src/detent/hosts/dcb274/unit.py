@@ -19,7 +19,7 @@ from detent.hosts.dcb274.handshake import (
     is_name,
 )
 from detent.hosts.dcb274.ranges import FASTEST, SLOWEST, name_of_axis, ramp_seconds
-from detent.hosts.errors import BadAnswer, Busy, MotionFailed, NoAnswer, Spoken
+from detent.hosts.errors import BadAnswer, Busy, MotionFailed, NoAnswer, Refused, Spoken
 from detent.hosts.exchange import Rest, Steps, operation, until
 
 MODES: Final = ("single", "party", "daisy", "sin10")
@@ -89,8 +89,16 @@ class Unit(Axis):
     def command(self, text: str, seconds: float = CLEARING) -> Steps[str]:
         """Any line as it is typed, without its end: what stands behind the echo. It may take so many `seconds`.
 
-        For what has no call of its own: other firmware, the retired ``E n``. It knows nothing of pending periods.
+        For what has no call of its own: other firmware, the retired ``E n``. It knows nothing of pending periods. A
+        unit that was left in program mode takes it all the same, and stores it; ``P`` ends that mode (page 47).
         """
+        if not self._connected:
+            try:
+                yield from self.connect()
+            except Refused:
+                if not (isinstance(self._way, SingleMode) and self._way.programming):
+                    raise
+                return (yield from self._enter(text, seconds))
         return (yield from self._line(text, seconds))
 
     def _line(self, text: str, seconds: float = QUICK) -> Steps[str]:
