@@ -407,7 +407,8 @@ def _judge(
     if plot is not None:
         from detent.outputs import motor_figures
 
-        motor_figures.write_move(plot, run, f"{move.steps} steps: {move.words}")
+        about = _line(verdict, move.rig) if loss is None else f"steps {loss}"
+        motor_figures.write_move(plot, run, f"{move.steps} steps: {move.words.partition(' (')[0]}", about)
     if json:
         print(json_text.dumps(facts))
         return

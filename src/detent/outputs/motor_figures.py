@@ -50,8 +50,8 @@ def write_curve(
         save(figure, path)
 
 
-def write_move(path: Path, run: Run, title: str) -> None:
-    """Draw a move that was simulated with a trace. ValueError, ImportError, OSError."""
+def write_move(path: Path, run: Run, title: str, about: str = "") -> None:
+    """Draw a move that was simulated with a trace; `about` stands for its verdict. ValueError, ImportError, OSError."""
     with style():
         figure = _figure(12.0, 8.4)
         boxes = [(0.075, bottom, 0.9, height) for bottom, height in ((0.62, 0.27), (0.36, 0.2), (0.08, 0.22))]
@@ -75,7 +75,7 @@ def write_move(path: Path, run: Run, title: str) -> None:
         dress(current, "time (ms)", "current (A)")
         for axes in (position, angle, current):
             axes.set_xlim(times[0], times[-1])
-        _head(figure, f"{run.rig.motor.name}: {title}", str(run.verdict))
+        _head(figure, f"{run.rig.motor.name}: {title}", about or str(run.verdict))
         save(figure, path)
 
 
