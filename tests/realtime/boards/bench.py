@@ -44,6 +44,7 @@ class Bench:
         self.axes: dict[str, Axis] = {}
         self.told: dict[str, list[MotionStarted | MotionCut | MotionEnded]] = {}
         self.now: Ns = 0
+        self.stride: Ns = 2 * MS
         self.aligned = False
         if start:
             self.boards.start(self.wall)
@@ -90,9 +91,9 @@ class Bench:
             told.clear()
 
     def step(self) -> None:
-        """To whatever is next, at most 2 ms on."""
+        """To whatever is next, at most a stride on."""
         times = [at for at in (self.boards.deadline(), self.boards.commit_at()) if at is not None]
-        self.turn(max(min([*times, self.wall + 2 * MS]), self.wall + 1000))
+        self.turn(max(min([*times, self.wall + self.stride]), self.wall + 1000))
 
     def run(self, time: Ns) -> None:
         """For so long."""

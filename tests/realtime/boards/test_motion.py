@@ -99,12 +99,18 @@ def test_an_exact_pulse_is_on_its_nearest_tick() -> None:
     assert [tick for tick, _, _ in made.machine.steps] == [scale.tick(time) for time, _ in kept["slide"].times]
 
 
-def test_slow_pulses_have_clocks_of_their_own() -> None:
-    """One step in 25 s is more than 2**28 ticks of 16 MHz: the step clock is set anew, the count goes on."""
+@pytest.mark.parametrize("period", [25 * SECOND, 150 * SECOND, 270 * SECOND])
+def test_slow_pulses_go_on_from_the_last_one(period: Ns) -> None:
+    """A step in 25 s is more than 2**28 ticks of 16 MHz, one in 150 s more than 2**31, one in 270 s more than 2**32.
+
+    The step clock is set once all the same: a stop that the host has not heard of takes no step.
+    """
     made = bench()
+    made.stride = 200 * MS
     kept = recorded(made)
-    made.move(Train((Uniform(0, 25 * SECOND, 1, 3),)), 1)
-    made.rest(most=100 * SECOND)
+    made.move(Train((Uniform(0, period, 1, 2),)), 1)
+    made.rest(most=4 * period)
+    assert [name for _, name, _ in made.board.log if name == "reset_step_clock"] == ["reset_step_clock"]
     edges_are(made, kept["slide"], 1 * US)
     counts_agree(made)
 

@@ -270,7 +270,7 @@ class Stepper:
         while span.next <= upto and room > 0:
             run = runs.one(upto)
             self._put(channel, run, up)
-            room -= 1
+            room -= 2  # a run behind a long rest takes two entries
             span.next += run.steps
             self._sent += span.direction * run.steps
             self._proved = False
@@ -279,14 +279,27 @@ class Stepper:
         self.told_through = span.train.time_of(span.next - 1) if span.next > 1 else self.told_through
 
     def _put(self, channel: _Channel, run: Run, up: bool) -> None:
+        """Send a run.
+
+        A step clock is set only where the firmware has none: behind a stop it takes no step until it gets one, and a
+        host that has not heard of the stop yet must not give it. Behind a long rest the first interval is therefore
+        counted from the last step all the same, in the 32 bits of the firmware's clock.
+        """
         core = self._core
-        if channel.last is None or run.base != channel.last:
-            core.command("reset_step_clock", oid=channel.oid, clock=run.base & MASK)
         if channel.up is not up:
             core.command("set_next_step_dir", oid=channel.oid, dir=int(up))
             channel.up = up
-        core.command("queue_step", oid=channel.oid, interval=run.interval, count=run.steps, add=run.add)
-        core.queue.take(channel.oid, run.tick(1))
+        rest: Run | None = run
+        if channel.last is None:
+            core.command("reset_step_clock", oid=channel.oid, clock=run.base & MASK)
+        elif run.base != channel.last:
+            interval = run.tick(1) - channel.last & MASK
+            core.command("queue_step", oid=channel.oid, interval=interval, count=1, add=0)
+            core.queue.take(channel.oid, run.tick(1))
+            rest = run.split(1)[1] if run.steps > 1 else None
+        if rest is not None:
+            core.command("queue_step", oid=channel.oid, interval=rest.interval, count=rest.steps, add=rest.add)
+            core.queue.take(channel.oid, rest.tick(1))
         channel.last = run.last
 
     def not_before(self, tick: int) -> None:

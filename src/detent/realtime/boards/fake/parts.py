@@ -62,7 +62,8 @@ class Stepper(Part):
         move = self.queue.popleft()
         board.free_move()
         self.count, self.interval, self.add = move.steps, move.interval + move.add, move.add
-        self.next_step += move.interval
+        # 32 bits: behind a long rest the interval goes round
+        self.next_step = board.whole(self.next_step + move.interval)
         at = self.next_step
         if was_active and at < self.earliest:
             if at - self.earliest < -board.frequency // 1000:
