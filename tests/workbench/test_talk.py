@@ -3,7 +3,9 @@
 from tests.workbench.told import Told, alone, example
 
 from detent.cell.deeds import Power, Send, SetPin, Type
+from detent.lines.microbus import LET_GO
 from detent.ticks import MS, SECOND
+from detent.uart import characters
 from detent.workbench.talk import Row, Talk, shown
 
 
@@ -165,3 +167,17 @@ def test_what_was_said_in_a_dropped_past_was_not_said() -> None:
 def test_control_characters_have_names() -> None:
     assert shown(b"F\r") == "F CR"
     assert shown(b"\r\nOK\x1b\x80") == "CR LF OK ESC 80h"
+
+
+def test_half_a_message_on_a_microbus_ends_where_the_drives_forget_it() -> None:
+    """docs/controllers/supersigma.md, "Half a message": behind a silence, or when the CCU lets go."""
+    told = alone("supersigma")
+    for half in (b"\x01\x01\x13", (*characters(b"\x01\x03"), LET_GO)):
+        told.history.do(Send(0, half))
+        told.run(told.history.now + (150 * MS if half == b"\x01\x01\x13" else MS))
+    told.history.do(Send(0, b"\x01\x05"))
+    told.run(told.history.now + SECOND)
+    hosts = [row for row in said(told).rows if not row.sender]
+    assert [row.data.hex(" ") for row in hosts] == ["01 01 13", "01 03", "01 05"]
+    assert hosts[-1].note == "status"
+    assert said(told).rows[-1].data.hex(" ") == "00 00 00"

@@ -6,11 +6,13 @@ from typing import Final, NamedTuple
 from detent.cell.recording import Received
 from detent.controllers import catalogue
 from detent.controllers.phrase import Lines, Phrases
+from detent.controllers.supersigma import link
 from detent.ticks import MS, Ns
 from detent.workbench.messages import LinePicture, Picture
 from detent.workbench.mirror import Mirror
 
 SILENCE: Final[Ns] = 200 * MS  # what comes later does not belong to a frame that was begun before
+BUS_SILENCE: Final[Ns] = link.SILENCE  # nor, on a MICROBUS, for its drives
 MOST_ROWS: Final = 5_000  # of a line
 LONGEST: Final = 80  # bytes of a row
 _CONTROLS: Final = [
@@ -72,7 +74,9 @@ class _Line:
         self._ports = {k: mirror.views[k].port for k in self._units}
         self._model = catalogue.MODELS.get(picture.units[line.units[0]].model)
         self._unit = mirror.by_name[line.units[0]]
-        self._text = shown if line.kind != "microbus" else lambda data: data.hex(" ").upper()
+        self._bus = line.kind == "microbus"
+        self._silence = BUS_SILENCE if self._bus else SILENCE
+        self._text = shown if not self._bus else lambda data: data.hex(" ").upper()
         self._phrases: Phrases = Lines()
         self.rows: list[Row] = []
         self.first = 0  # the number of the first of them
@@ -84,13 +88,16 @@ class _Line:
         said, gone = mirror.said, mirror.said_gone
         for unit, entry in said[max(self._seen - gone, 0) :]:
             if isinstance(entry, Received):
-                if unit == self._heard_by and entry.port == self._ports[unit].receives:
+                if self._bus and not entry.char.framing_ok:  # the CCU lets go: the drives forget half a message
+                    if self._host in self._open:
+                        self._close(self._host)
+                elif unit == self._heard_by and entry.port == self._ports[unit].receives:
                     self._take(self._host, entry.began, entry.at, entry.char.value, not all(entry.char[1:]))
             elif unit in self._units and entry.port == self._ports[unit].sends:
                 self._take(self._units[unit], entry.at, entry.done, entry.char.value, not all(entry.char[1:]))
         self._seen = gone + len(said)
         for sender, row in list(self._open.items()):
-            if row.end + SILENCE < now:
+            if row.end + self._silence < now:
                 self._close(sender)
         if len(self.rows) > MOST_ROWS:
             excess = len(self.rows) - MOST_ROWS
@@ -103,7 +110,7 @@ class _Line:
 
     def _take(self, sender: str, begin: Ns, end: Ns, value: int, damaged: bool) -> None:
         row = self._open.get(sender)
-        if row is not None and begin - row.end > SILENCE:
+        if row is not None and begin - row.end > self._silence:
             self._close(sender)
             row = None
         if row is None:
