@@ -130,6 +130,15 @@ def test_the_sleep_ends_a_little_before_the_deadline_and_the_rest_is_watched() -
     assert cell.ticks == 0
 
 
+@pytest.mark.parametrize("far", [10**6 * SECOND, 1 << 99])
+def test_no_sleep_is_longer_than_systems_can_sleep(far: int) -> None:
+    wall, cell = Ready(), TickingCell(far)
+    loop = Loop(cell, Pace(Fraction(1, 10**9), clock=wall), [(0, Client())], wait=wall.wait)
+    loop.step()
+    loop.close()
+    assert wall.asked == [3600.0]
+
+
 class Slow(TickingCell):
     """A cell that takes ten times as long as it lasts."""
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.realtime.ticking import Wall
 
-from detent.realtime.pace import Lateness, Pace
+from detent.realtime.pace import LATEST, Lateness, Pace
 from detent.ticks import NEVER
 
 HOUR = 3_600_000_000_000
@@ -34,6 +34,20 @@ def test_a_tenth_means_a_tenth() -> None:
 def test_time_does_not_stand_still_or_go_back(factor: float) -> None:
     with pytest.raises(ValueError, match="would not go forward; it takes a number above 0"):
         Pace(factor, clock=Wall())
+
+
+@pytest.mark.parametrize("factor", [1e-10, 1e30, 1e300, Fraction(1, 10**12)])
+def test_a_pace_beyond_all_use_is_refused(factor: float) -> None:
+    with pytest.raises(ValueError, match="out of reach; it takes 1e-09 to 1e\\+09, 1 is real time"):
+        Pace(factor)
+    with pytest.raises(ValueError, match="out of reach"):
+        Pace().change(factor, 0)
+
+
+def test_time_ends_before_deadlines_that_never_come() -> None:
+    clock = iter([0, 10**40])
+    pace = Pace(10**9, clock=lambda: next(clock))
+    assert pace.at(pace.clock()) == LATEST < NEVER
 
 
 def test_a_restarted_clock_forgets_the_time_before() -> None:

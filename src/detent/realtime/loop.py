@@ -26,6 +26,7 @@ from detent.ticks import MS, SECOND, US, Ns
 from detent.uart import Chars
 
 EARLY: WallNs = 60 * US  # sleeping is given up so long before a deadline: no system wakes a sleeper to the microsecond
+LONGEST_SLEEP: WallNs = 3600 * SECOND  # systems refuse to sleep for years, and nobody minds a wake-up an hour
 LONGEST: WallNs = 2 * MS  # a cell that cannot keep pace lets the clients have a word so often
 BEHIND = 64  # characters waiting on a line before its clients have to wait
 
@@ -247,7 +248,7 @@ class Loop:
         if due is None:
             return None
         left = due - self._pace.clock()
-        return left / SECOND if left > 0 else 0.0
+        return min(left, LONGEST_SLEEP) / SECOND if left > 0 else 0.0
 
     def _catch_up(self) -> None:
         """Run the cell to the present, deadline by deadline, and note how late each was served."""

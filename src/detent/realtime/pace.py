@@ -15,6 +15,9 @@ from detent.ticks import NEVER, Ns
 WallNs: TypeAlias = int
 Clock: TypeAlias = Callable[[], WallNs]
 
+SLOWEST, FASTEST = Fraction(1, 10**9), 10**9  # of paces: a second in 30 years, and the other way round
+LATEST: Ns = NEVER >> 1  # where the time of a cell stands, however fast it went: everything due is before NEVER
+
 _STEPS = 16  # classes of lateness in each doubling: a percentile is at most 1/16 too high
 _LARGEST = 1 << 40  # 18 minutes; later than that is counted as that, `most` still tells the truth
 
@@ -27,8 +30,7 @@ class Pace:
     """
 
     def __init__(self, factor: Fraction | float = 1, *, origin: Ns = 0, clock: Clock = time.monotonic_ns) -> None:
-        if not 0 < factor < math.inf:
-            raise ValueError(f"pace {factor} would not go forward; it takes a number above 0")
+        _check(factor)
         self.clock = clock
         self.held = False
         self.free = False
@@ -59,8 +61,7 @@ class Pace:
     def change(self, factor: Fraction | float | None, now: Ns) -> None:
         """From the cell time `now` on it runs at `factor`; None: free. Raises ValueError."""
         if factor is not None:
-            if not 0 < factor < math.inf:
-                raise ValueError(f"pace {factor} would not go forward; it takes a number above 0")
+            _check(factor)
             self._set(factor)
         self.free = factor is None
         self.restart(now)
@@ -71,7 +72,7 @@ class Pace:
             return self._origin
         if self.free:
             return NEVER
-        return self._origin + (wall - self._began) * self._multiply // self._divide
+        return min(self._origin + (wall - self._began) * self._multiply // self._divide, LATEST)
 
     def due(self, at: Ns) -> WallNs | None:
         """The first wall time at which the cell time is at least `at`; None: not before it is told to go on."""
@@ -80,6 +81,15 @@ class Pace:
         if self.held and at > self._origin:
             return None
         return self._began - (self._origin - at) * self._divide // self._multiply
+
+
+def _check(factor: Fraction | float) -> None:
+    if not 0 < factor < math.inf:
+        raise ValueError(f"pace {factor} would not go forward; it takes a number above 0")
+    if not SLOWEST <= factor <= FASTEST:
+        raise ValueError(
+            f"pace {float(factor):g} is out of reach; it takes {float(SLOWEST):g} to {float(FASTEST):g}, 1 is real time"
+        )
 
 
 class LatenessSummary(NamedTuple):

@@ -13,6 +13,7 @@ from detent.cell.cell import Cell
 from detent.cell.delivery import Oscillation, Store, no_store
 from detent.cell.description import Description, Problem
 from detent.cell.mechanics import Mechanics
+from detent.controllers import catalogue
 from detent.motors.motor import MotorError
 from detent.pins import Level
 from detent.realtime.boards.drive import Opened, RealPins
@@ -223,7 +224,10 @@ def open_endpoints(
     opened: list[tuple[int, Endpoint]] = []
     for place, number in enumerate(outside):
         for one in _for_line(description, wanted, place, names[number], len(outside)):
-            endpoint = one.open(names[number], cell.lines[number].format, cell.lines[number].parting)
+            line = cell.lines[number]
+            units = [description.units[cell.wiring.names[unit]].model for unit, _ in cell.wiring.lines[number]]
+            echoes = any(model.echoes for name, model in catalogue.MODELS.items() if name in units)
+            endpoint = one.open(names[number], line.format, line.parting, echoes=echoes)
             opening.callback(endpoint.close)
             opened.append((number, endpoint))
     return opened

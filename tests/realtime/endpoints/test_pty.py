@@ -1,12 +1,15 @@
 import os
 import select
+import sys
 import termios
 import tty
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
+import serial
 from tests.realtime.ticking import TickingCell, look
 
 from detent.realtime.endpoints.endpoint import MOST_WAITING, EndpointError
@@ -86,12 +89,12 @@ def test_a_client_may_set_the_format_of_the_controller() -> None:
 def test_a_client_that_does_not_read_loses_the_oldest_bytes_and_stops_nobody() -> None:
     terminal, cell = PseudoTerminal(), TickingCell(None)
     with served(terminal, cell):
+        client = opened(terminal.address)
         told = 0
         while not terminal.dropped:
             terminal.send(b"%07d\r" % told, 0)
             told += 1
         assert told * 8 > MOST_WAITING
-        client = opened(terminal.address)
         tty.setraw(client, termios.TCSANOW)  # without flushing what waits there
         read = b""
         while not read.endswith(b"%07d\r" % (told - 1)):
@@ -125,15 +128,75 @@ def test_a_link_that_was_left_behind_is_replaced(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_link_that_somebody_took_over_is_left_alone(tmp_path: Path) -> None:
+def test_a_link_that_somebody_put_elsewhere_is_left_alone(tmp_path: Path) -> None:
     link = tmp_path / "stepper"
     terminal = PseudoTerminal(link)
-    other = PseudoTerminal(link)
+    link.unlink()
+    link.symlink_to("/dev/null")
     terminal.close()
     terminal.close()
-    assert link.is_symlink()
-    other.close()
-    assert not link.is_symlink()
+    assert os.readlink(link) == "/dev/null"
+
+
+def test_a_link_is_not_taken_from_one_who_serves_there(tmp_path: Path) -> None:
+    link = tmp_path / "stepper"
+    terminal = PseudoTerminal(link)
+    with pytest.raises(EndpointError, match="stepper is in use: another detent serves there; stop it, or choose"):
+        PseudoTerminal(link)
+    with served(terminal, TickingCell(None)) as loop:
+        client = opened(str(link))
+        os.write(client, b"F\r")
+        assert answer(loop, client, 2) == b"F\r"
+        os.close(client)
+    PseudoTerminal(link).close()
+
+
+SETTINGS = [
+    {"baudrate": 9600, "bytesize": 7, "parity": "O", "stopbits": 2},
+    {"baudrate": 9600, "bytesize": 7, "parity": "E", "stopbits": 1},
+    {"baudrate": 50, "bytesize": 8, "parity": "E", "stopbits": 1},
+    {"baudrate": 115200, "bytesize": 8, "parity": "N", "stopbits": 1},
+]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux refuses formats on a pseudo-terminal")
+@pytest.mark.parametrize("settings", SETTINGS, ids=str)
+def test_any_format_can_be_asked_for_again_and_again(settings: dict[str, Any]) -> None:
+    """The kernel does not take 7 bits or parity, and what it does not take is an error if nothing else changes."""
+    terminal = PseudoTerminal()
+    with served(terminal, TickingCell(None)) as loop:
+        for _ in range(3):
+            with serial.Serial(terminal.address, timeout=0, **settings) as client:
+                for attribute, value in [("timeout", 0), ("timeout", 60), *settings.items()]:
+                    settle(loop)
+                    setattr(client, attribute, value)  # each sets everything again
+                client.write(b"F\r")
+                settle(loop)
+                assert client.read(2) == b"F\r"
+            settle(loop)
+
+
+def settle(loop: Loop) -> None:
+    """Have the loop see what the kernel has to tell."""
+    for _ in range(3):
+        loop.step()
+
+
+def test_what_a_client_left_unread_is_not_for_the_next() -> None:
+    terminal = PseudoTerminal()
+    with served(terminal, TickingCell(None)) as loop:
+        for text in (b"old\r", b"older\r"):
+            client = opened(terminal.address)
+            os.write(client, text)
+            settle(loop)
+            assert select.select([client], [], [], 60)[0]  # it is there to be read
+            os.close(client)
+        settle(loop)
+        terminal.send(b"to nobody", 0)
+        client = opened(terminal.address)
+        os.write(client, b"new\r")
+        assert answer(loop, client, 4) == b"new\r"
+        os.close(client)
 
 
 def test_a_file_is_never_replaced_by_a_link(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from detent.cell.description import single
 from detent.lines.line import Heard
 from detent.realtime.endpoints.rfc2217 import QUIET, Rfc2217Port
 from detent.realtime.endpoints.tcp import TcpAddress
-from detent.realtime.endpoints.telnet import COM_PORT, parameters
+from detent.realtime.endpoints.telnet import COM_PORT, DO, DONT, ECHO, SUPPRESS_GO_AHEAD, WILL, parameters, wish
 from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace
@@ -123,8 +123,8 @@ def test_serialx_asks_without_blocking_and_clients_come_one_after_the_other() ->
 class Bench:
     """A port, a cell that echoes, and a loop driven by hand."""
 
-    def __init__(self) -> None:
-        self.port = Rfc2217Port(TcpAddress("127.0.0.1", 0), "drill", Format(9600))
+    def __init__(self, *, echoes: bool = False) -> None:
+        self.port = Rfc2217Port(TcpAddress("127.0.0.1", 0), "drill", Format(9600), echoes=echoes)
         self.cell = TickingCell(None)
         self.loop = Loop(self.cell, Pace(), [(0, self.port)], wait=look)
         self.client = socket.create_connection(TcpAddress.parse(self.port.address))
@@ -158,6 +158,23 @@ def test_a_client_that_sets_nothing_has_the_format_of_the_line(bench: Bench) -> 
     assert bench.read(5) == b"V1\r\xff\xff"
     ((_, _, chars),) = bench.cell.sent
     assert list(chars) == [Char(value) for value in b"V1\r\xff"]
+
+
+def test_a_line_that_echoes_asks_a_telnet_for_each_character_and_not_to_show_it() -> None:
+    """RFC 857, 858: with both a telnet sends what is typed at once, and shows only what comes back."""
+    bench = Bench(echoes=True)
+    assert bench.read(6) == wish(WILL, ECHO) + wish(WILL, SUPPRESS_GO_AHEAD)
+    bench.client.sendall(wish(DO, ECHO) + wish(DO, SUPPRESS_GO_AHEAD) + b" ")
+    assert bench.read(1) == b" "
+    bench.close()
+
+
+def test_a_client_that_wants_no_echo_is_served_all_the_same() -> None:
+    bench = Bench(echoes=True)
+    bench.read(6)
+    bench.client.sendall(wish(DONT, ECHO) + wish(DONT, SUPPRESS_GO_AHEAD) + b"X\r")
+    assert bench.read(2) == b"X\r"
+    bench.close()
 
 
 def test_what_a_slow_receiver_was_left_with_is_told_when_the_line_is_quiet(bench: Bench) -> None:

@@ -47,14 +47,15 @@ _CR_NUL = b"\r\0"
 
 
 class ComPort:
-    """One client's port on the line `name`, whose characters have the format `line`."""
+    """One client's port on the line `name`, whose characters have the format `line`; one that `echoes` can say so."""
 
-    def __init__(self, line: Format, name: str) -> None:
+    def __init__(self, line: Format, name: str, *, echoes: bool = False) -> None:
         self.format = self._line = line
         self.dropped = 0  # bytes that were lost because the client told us to hold them and never asked for them
         self._name = name
         self._decoder = telnet.Decoder()
-        self._options = telnet.Options(frozenset((telnet.BINARY, telnet.SUPPRESS_GO_AHEAD, telnet.COM_PORT)))
+        agreed = (telnet.BINARY, telnet.SUPPRESS_GO_AHEAD, telnet.COM_PORT, *([telnet.ECHO] if echoes else ()))
+        self._options = telnet.Options(frozenset(agreed))
         self._behind_cr = False  # the last character of a client that is no more than a telnet
         self._stop_size = line.stop_bits
         self._flow = {question: choices[0] for question, choices in _FLOW.items()}
@@ -64,6 +65,12 @@ class ComPort:
         self._held = bytearray()
         self._last: Ns = -1  # when the last character that was heard ended
         self._tuned()
+
+    def offer_echo(self) -> bytes:
+        """What tells a plain telnet to send each character as it is typed, and to leave showing it to the line."""
+        return self._options.offer(telnet.WILL, telnet.ECHO) + self._options.offer(
+            telnet.WILL, telnet.SUPPRESS_GO_AHEAD
+        )
 
     # -- from the client ---------------------------------------------------------------------------------
 

@@ -1,37 +1,67 @@
-"""A pseudo-terminal: what a program that expects a serial port opens."""
+"""A pseudo-terminal: what a program that expects a serial port opens.
 
+Linux keeps 8 data bits and no parity on a pseudo-terminal, whatever a client asks for. The C library makes an error of
+that (EINVAL) if nothing else that was asked for made a difference: a port would open in 7O2 once, and never again. So
+something always is to make a difference: when a client has set something, the speed, which means nothing here, is set
+to one that nobody uses. The kernel tells of settings in packet mode, with EXTPROC set; nothing else comes of both.
+"""
+
+import fcntl
 import os
 import pty
 import stat
+import struct
+import sys
+import termios
 import tty
 from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 
-from detent.realtime.endpoints.endpoint import EndpointError, Outgoing, read_ready
+from detent.realtime.endpoints.endpoint import MOST_READ, EndpointError, Outgoing
+from detent.realtime.endpoints.opened import Opened
 from detent.realtime.pace import WallNs
+from detent.uart import Chars
+
+UNUSUAL = termios.B134
+_EXTPROC = 0o200000  # of the local flags, on Linux
+_TELLS = sys.platform.startswith("linux")
+_LFLAG, _ISPEED, _OSPEED = 3, 4, 5  # in what `tcgetattr` gives
 
 
 class PseudoTerminal:
     """A raw pseudo-terminal, on request under the name `link` too. Clients come and go as they like.
 
-    Its own end of the clients' side stays open, so that the last client leaving ends nothing. Baud rate and
-    format that a client sets are accepted and have no effect: the line of the cell has its own.
+    Its own end of the clients' side stays open, so that the last client leaving ends nothing; what nobody has read is
+    forgotten then, and what comes while nobody has it open, as at a serial port. Baud rate and format that a client
+    sets are accepted and have no effect: the line of the cell has its own.
     """
 
     kind = "pty"
 
-    def __init__(self, link: Path | None = None) -> None:
-        """Raises EndpointError if `link` cannot be made or is something else than a link."""
+    def __init__(self, link: Path | None = None, parting: Chars = b"") -> None:
+        """`parting` is what the line hears when the last client leaves, if it said something.
+
+        Raises EndpointError if `link` cannot be made, is something else than a link, or is served by another.
+        """
         try:
             self._ours, self._theirs = pty.openpty()
         except OSError as error:
             raise EndpointError(f"no pseudo-terminal to be had: {error.strerror or error}") from error
+        self._parting = parting
+        self._said = False  # a client has said something since the last one left
+        self._owed: Chars = b""  # to the line: it has not heard yet that they left
         self._link: Path | None = None
+        self._clients: Opened | None = None
         try:
             tty.setraw(self._theirs)
             os.set_blocking(self._ours, False)
             self._device = os.ttyname(self._theirs)
+            _lock(self._theirs)
+            if _TELLS:
+                fcntl.ioctl(self._ours, termios.TIOCPKT, struct.pack("i", 1))
+                _unsettle(self._theirs)
+            self._clients = Opened(self._device)
             if link is not None:
                 _point(link, self._device)
                 self._link = link
@@ -47,8 +77,9 @@ class PseudoTerminal:
         return self._outgoing.dropped
 
     def reading(self, room: bool) -> Sequence[int]:
-        """Our end, while the line has room."""
-        return (self._ours,) if room else ()
+        """Our end, while the line has room; and who comes and goes."""
+        coming = self._clients.reading() if self._clients is not None else ()
+        return (*coming, self._ours) if room else coming
 
     def writing(self) -> Sequence[int]:
         """Our end, while bytes wait."""
@@ -61,20 +92,52 @@ class PseudoTerminal:
     def due(self, wall: WallNs) -> None:
         """Nothing is ever due."""
 
-    def receive(self, descriptor: int, wall: WallNs) -> bytes:
-        """What the client wrote."""
-        return read_ready(descriptor)
+    def receive(self, descriptor: int, wall: WallNs) -> Chars:
+        """What the client wrote; and that the last one has left, where that means something."""
+        if descriptor != self._ours:
+            self._come_and_go()
+            owed, self._owed = self._owed, b""
+            return owed
+        try:
+            read = os.read(self._ours, MOST_READ + 1 if _TELLS else MOST_READ)
+        except BlockingIOError:
+            return b""
+        if not _TELLS:
+            return read
+        self._said |= len(read) > 1
+        if read[:1] != b"\0":  # not data
+            _unsettle(self._theirs)
+            return b""
+        return read[1:]
 
     def send(self, data: bytes, wall: WallNs) -> None:
         """Give `data` to the client, now or when it reads."""
-        self._outgoing.send(data)
+        if self._somebody():
+            self._outgoing.send(data)
 
     def flush(self) -> None:
         """The client has read something."""
         self._outgoing.flush()
 
+    def _somebody(self) -> bool:
+        """Whether a client has it open."""
+        if self._clients is None or self._clients.somebody:
+            return True
+        self._come_and_go()
+        return self._clients.somebody
+
+    def _come_and_go(self) -> None:
+        """Clients came or left: what the last one has not read is not for the next."""
+        if self._clients is not None and self._clients.update():
+            if self._said:
+                self._owed, self._said = self._parting, False
+            self._outgoing.forget()
+            termios.tcflush(self._theirs, termios.TCIFLUSH)
+
     def close(self) -> None:
         """Close the terminal; remove the link if it still is ours."""
+        if self._clients is not None:
+            self._clients.close()
         if self._link is not None:
             link, self._link = self._link, None
             try:
@@ -88,6 +151,41 @@ class PseudoTerminal:
         self._ours = self._theirs = -1
 
 
+def _unsettle(descriptor: int) -> None:
+    """Whatever a client sets next makes a difference, and is told."""
+    settings = termios.tcgetattr(descriptor)
+    if settings[_OSPEED] != UNUSUAL or not settings[_LFLAG] & _EXTPROC:
+        settings[_ISPEED] = settings[_OSPEED] = UNUSUAL
+        settings[_LFLAG] |= _EXTPROC
+        termios.tcsetattr(descriptor, termios.TCSANOW, settings)
+
+
+_SET_LOCK = getattr(fcntl, "F_OFD_SETLK", None)  # of an open file, so that no other opening or closing releases it
+
+
+def _lock(descriptor: int) -> bool:
+    """Mark a terminal as served while `descriptor` is open; False if another serves it. Clients notice nothing."""
+    if _SET_LOCK is None:
+        return True
+    try:
+        fcntl.fcntl(descriptor, _SET_LOCK, struct.pack("hhqqi4x", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0))
+    except OSError:
+        return False
+    return True
+
+
+def _served(device: Path) -> bool:
+    """Whether `device` is a terminal that somebody serves."""
+    try:
+        descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        return not _lock(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def _point(link: Path, device: str) -> None:
     """Make `link` point to `device`: in one step, if it pointed elsewhere before."""
     try:
@@ -98,6 +196,8 @@ def _point(link: Path, device: str) -> None:
         raise EndpointError(f"{link}: {error.strerror}; choose another LINK for --pty") from error
     if present is not None and not stat.S_ISLNK(present.st_mode):
         raise EndpointError(f"{link} exists and is not a symbolic link; remove it or choose another LINK for --pty")
+    if present is not None and _served(link):
+        raise EndpointError(f"{link} is in use: another detent serves there; stop it, or choose another LINK for --pty")
     try:
         temporary = _link_beside(link, device)
         try:

@@ -20,12 +20,18 @@ class Rfc2217Port(TcpPort):
 
     kind = "rfc2217"
 
-    def __init__(self, address: TcpAddress, name: str, form: Format, parting: Chars = b"") -> None:
-        """Raises EndpointError if the port cannot be had."""
+    def __init__(
+        self, address: TcpAddress, name: str, form: Format, parting: Chars = b"", *, echoes: bool = False
+    ) -> None:
+        """`echoes`: the line sends back what is typed, so a plain telnet need not show it, nor keep it until Enter.
+
+        Raises EndpointError if the port cannot be had.
+        """
         super().__init__(address, name, parting)
+        self._echoes = echoes
         self._form = form
         self._lost_before = 0  # by earlier clients
-        self._port = ComPort(form, name)
+        self._port = ComPort(form, name, echoes=echoes)
         self._idle_at: WallNs | None = None
 
     @property
@@ -55,8 +61,10 @@ class Rfc2217Port(TcpPort):
 
     def _begin(self) -> None:
         self._lost_before += self._port.dropped
-        self._port = ComPort(self._form, self._name)
+        self._port = ComPort(self._form, self._name, echoes=self._echoes)
         self._idle_at = None
+        if self._echoes:
+            self._outgoing.send(self._port.offer_echo())
 
     def _understood(self, data: bytes, wall: WallNs) -> Chars:
         chars, answer = self._port.receive(data)

@@ -2,6 +2,7 @@
 
 import os
 import select
+import stat
 import termios
 from collections.abc import Sequence
 
@@ -23,6 +24,8 @@ class SerialPort:
         except ImportError as error:
             raise EndpointError(f"--serial needs serialx, which is not installed: {how_to_install()}") from error
         self.address = address
+        if _is_pseudo_terminal(address):  # it carries bytes, and Linux refuses it any other format
+            form = form._replace(data_bits=8, parity="none")
         try:
             self._port = serialx.Serial(  # type: ignore[abstract]  # it is this system's own class
                 address, form.baud, byte_size=form.data_bits, parity=form.parity[0].upper(), stopbits=form.stop_bits
@@ -87,6 +90,15 @@ class SerialPort:
 
     def _lost(self) -> EndpointLost:
         return EndpointLost(f"{self.address} is gone; plug it in again and start anew")
+
+
+def _is_pseudo_terminal(address: str) -> bool:
+    """Whether a device is the clients' side of a pseudo-terminal of Linux: its major numbers are 136 to 143."""
+    try:
+        device = os.stat(address)
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISCHR(device.st_mode) and 136 <= os.major(device.st_rdev) <= 143
 
 
 def _hung_up(descriptor: int) -> bool:

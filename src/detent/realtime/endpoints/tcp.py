@@ -1,6 +1,7 @@
 """A TCP port: the bytes of the line as they are, for one client at a time."""
 
 import contextlib
+import select
 import socket
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -204,6 +205,10 @@ def _listen(address: TcpAddress) -> socket.socket:
 
 def _gone(client: socket.socket) -> bool:
     """Whether a client that is not being read just now, because its line is behind, has said everything and left."""
+    if hasattr(select, "POLLRDHUP"):  # sees it behind what has not been read
+        poll = select.poll()
+        poll.register(client, select.POLLRDHUP)
+        return bool(poll.poll(0))
     try:
         return client.recv(1, socket.MSG_PEEK) == b""
     except BlockingIOError:

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 IAC: Final = 255
 DONT, DO, WONT, WILL, SB, BREAK, SE = 254, 253, 252, 251, 250, 243, 240
-BINARY, SUPPRESS_GO_AHEAD, COM_PORT = 0, 3, 44  # options
+BINARY, ECHO, SUPPRESS_GO_AHEAD, COM_PORT = 0, 1, 3, 44  # options
 MOST_PARAMETERS: Final = 256  # bytes of one subnegotiation that are kept; nobody has that much to say
 
 _IAC = bytes((IAC,))

@@ -55,17 +55,18 @@ class Wanted(NamedTuple):
             )
         return self
 
-    def open(self, name: str, form: Format, parting: Chars = b"") -> Endpoint:
+    def open(self, name: str, form: Format, parting: Chars = b"", *, echoes: bool = False) -> Endpoint:
         """The endpoint, for the line `name` with characters of `form`. Raises EndpointError.
 
-        `parting` is what the line hears when a client leaves, as far as that is seen: on a connection.
+        `parting` is what the line hears when a client leaves, as far as that is seen. One that `echoes` sends back what
+        is typed.
         """
         match self.kind:
             case "pty":
-                return PseudoTerminal(Path(self.where) if self.where else None)
+                return PseudoTerminal(Path(self.where) if self.where else None, parting)
             case "tcp":
                 return TcpPort(TcpAddress.parse(self.where), name, parting)
             case "rfc2217":
-                return Rfc2217Port(TcpAddress.parse(self.where), name, form, parting)
+                return Rfc2217Port(TcpAddress.parse(self.where), name, form, parting, echoes=echoes)
             case _:
                 return SerialPort(self.where, form)
