@@ -157,9 +157,14 @@ class Axis:
         return self._rare(draw)
 
     def _rare(self, draw: Random) -> Sequence[Deed]:
-        match draw.randrange(6):
+        match draw.randrange(8):
             case 0:
                 return [Power(False), Wait(1 * MS), Power(True), *self.ready()]
+            case 5 | 6:  # a reversal takes its time (page 46)
+                slope = Say(draw.choice(("K 20 20", "K 5 50", "K 50 5")))
+                rates = draw.choice((("M 5000", "M -3000"), ("M -9000", "M 900")))
+                return [slope, Wait(2 * MS), Say(rates[0]), Wait(draw.randrange(900) * MS), Say(rates[1]),
+                        Wait(draw.randrange(60) * MS)]  # fmt: skip
             case 4:  # the current has fallen to hold: w waits (page 51)
                 return [Say("w 20"), Wait(1200 * MS), Say(draw.choice(MOVES)), Wait(10 * MS)]
             case 1:
@@ -224,7 +229,7 @@ class Axis:
             case "M 0":
                 return phase in ("rest", "speeding up", "at speed", "slowing", "turning", "pre-energizing")
             case "let go":
-                return phase == "jogging"
+                return phase in ("jogging", "pre-energizing", "at speed", "slowing")
             case "limit":
                 return phase not in ("rest", "a program at rest", "a program moving", "pending", "turning", "jogging")
         return phase != "jogging"
@@ -249,7 +254,7 @@ class Axis:
         )
 
     def onward(self, draw: Random) -> Sequence[Deed]:
-        match draw.randrange(6):
+        match draw.randrange(8):
             case 0 | 1 | 2:
                 return [Say(draw.choice(("+ 400", "- 90", "+ 3", "M 900", "M -5000", "M 0", "F 900 0", "H 1", "H 3")))]
             case 3:
