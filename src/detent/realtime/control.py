@@ -215,10 +215,10 @@ class Control:
         if verb in ("pause", "resume", "step", "run-for", "pace") or (verb == "wait" and given.get("pause")):
             raise AskedWrongly("real pins are driven, and their time does not stand", "stop the motors with stop")
         if verb in ("set", "release", "fault"):
-            where = str(given["where"] if verb == "fault" else given["pin"])
-            unit, dot, pin = where.partition(".")
-            if not dot:
-                unit, pin = str(given.get("unit", next(iter(self._cell.controllers()), ""))), where
+            if verb == "fault":
+                unit, _, pin = str(given["where"]).partition(".")
+            else:
+                unit, pin = self._pin(given)
             if (unit, pin) in driven.plan.inputs.values():
                 raise AskedWrongly(f"{unit}.{pin} is an input of a board", "its level is that of the pin")
 

@@ -1,0 +1,152 @@
+"""A service with real pins: what it opens, refuses, tells, and what `detent control` does to it."""
+
+from collections.abc import Iterator
+
+import pytest
+from tests.realtime.boards.test_driven import CELL
+from tests.realtime.served import no_file
+
+from detent.cell.description import Problem, parse
+from detent.realtime.boards.drive import RealPins
+from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.port import FakePort
+from detent.realtime.boards.states import News
+from detent.realtime.control import Control
+from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.service import Service
+from detent.realtime.verbs import AskedWrongly
+from detent.ticks import MS, SECOND
+
+
+class Wall:
+    """Host time that passes when somebody waits."""
+
+    def __init__(self) -> None:
+        self.now = 1_000 * SECOND
+
+    def __call__(self) -> int:
+        return self.now
+
+    def sleep(self, *given: object) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        seconds = given[2]
+        assert isinstance(seconds, float)
+        self.now += max(round(seconds * SECOND), 10_000)
+        return (), ()
+
+
+def made(text: str, port: FakePort | None = None, **options: object) -> tuple[Service, Wall, list[News]]:
+    wall, news = Wall(), []
+    fake = port or FakePort(FakeBoard(moves=400))
+    real = RealPins(news.append, lambda address: fake, wall, wall.sleep)
+    service = Service(parse(text, "cell.toml"), no_file, [Wanted("tcp", "127.0.0.1:0")], real=real, observed=True,
+                      line_timing=False, **options)  # type: ignore[arg-type]  # fmt: skip
+    service._loop._wait = lambda r, w, x, s: (*wall.sleep(r, w, 0.02 if s is None else min(s, 0.02)), ())  # type: ignore[assignment,return-value]
+    service.restart_clock()
+    return service, wall, news
+
+
+def run(service: Service, wall: Wall, span: int) -> None:
+    end = wall.now + span
+    while wall.now < end:
+        service.step()
+
+
+@pytest.fixture
+def served() -> Iterator[tuple[Service, Wall, list[News]]]:
+    service, wall, news = made(CELL)
+    with service:
+        yield service, wall, news
+
+
+def test_control_looks_stops_and_recovers(served: tuple[Service, Wall, list[News]]) -> None:
+    service, wall, news = served
+    control = Control(service)
+    run(service, wall, 100 * MS)
+    control.do("type", {"text": "+3000"})
+    run(service, wall, 400 * MS)
+    state = control.do("board", {})
+    assert isinstance(state, dict)
+    axis = state["axes"]["x"]  # type: ignore[index,call-overload]
+    assert axis["standing"] == "driven"
+    assert axis["armed"] == ["x.ENABLE"]
+    assert 0 < axis["shaft"] < 3000
+    assert state["boards"]["b"]["state"] == "ready"  # type: ignore[index,call-overload]
+    control.do("stop", {})
+    run(service, wall, 200 * MS)
+    assert control.do("state", {})["real"]["axes"]["x"]["standing"] == "fault"  # type: ignore[index]
+    control.do("recover", {})
+    run(service, wall, 300 * MS)
+    state = control.do("board", {})
+    assert state["axes"]["x"]["standing"] == "driven"  # type: ignore[index]
+    assert [item.weight.value for item in news] == ["fault", "warning"]
+
+
+@pytest.mark.parametrize(
+    ("verb", "given", "error"),
+    [
+        ("pause", {}, "real pins are driven, and their time does not stand; stop the motors with stop"),
+        ("pace", {"pace": 2}, "real pins are driven"),
+        ("set", {"pin": "x.EOT", "level": 0}, "x.EOT is an input of a board; its level is that of the pin"),
+        ("set", {"pin": "EOT", "level": 0}, "x.EOT is an input of a board"),
+        ("fault", {"where": "x.EOT", "kind": "stuck", "level": 1}, "x.EOT is an input of a board"),
+    ],
+)
+def test_what_would_fool_a_motor_is_refused(
+    served: tuple[Service, Wall, list[News]], verb: str, given: dict[str, object], error: str
+) -> None:
+    with pytest.raises(AskedWrongly, match=error):
+        Control(served[0]).do(verb, given)
+
+
+def test_without_real_pins_there_is_nothing_to_stop() -> None:
+    with (
+        Service(parse(CELL, "cell.toml"), no_file, [Wanted("tcp", "127.0.0.1:0")], observed=True) as service,
+        pytest.raises(AskedWrongly, match="no real pins are driven; serve the cell with --real"),
+    ):
+        Control(service).do("stop", {})
+
+
+def test_positions_are_waited_for_across_a_stop_that_takes_the_cell_back() -> None:
+    service, wall, _ = made(CELL)
+    with service:
+        control = Control(service)
+        run(service, wall, 100 * MS)
+        waits = control.do("wait", {"unit": "x", "position": 20})
+        control.do("type", {"text": "+30"})
+        run(service, wall, 1 * SECOND)
+        assert waits.done()  # type: ignore[union-attr]
+
+
+def test_a_board_that_is_not_there_is_one_line() -> None:
+    def open_port(address: str) -> FakePort:
+        raise OSError(2, "No such file or directory: plug the board in")
+
+    with pytest.raises(Problem, match=r"cell\.toml: boards\.b\.serial: .*No such file"):
+        Service(parse(CELL, "cell.toml"), no_file, real=RealPins(lambda news: None, open_port))
+
+
+def test_a_pin_that_the_board_has_not_is_named_with_its_key() -> None:
+    with pytest.raises(Problem, match=r"cell\.toml: hardware\.x\.outputs\.MOV: .*gpio99"):
+        made(CELL.replace('MOV = "gpio6"', 'MOV = "gpio99"'))
+
+
+def test_a_firmware_that_is_too_old_names_what_is_missing() -> None:
+    port = FakePort(FakeBoard(moves=400, leave_out=("trsync_start",)))
+    with pytest.raises(Problem, match=r"cell\.toml: boards\.b\.serial: .*trsync_start"):
+        made(CELL, port)
+
+
+def test_what_is_no_board_does_not_answer() -> None:
+    port = FakePort(FakeBoard(moves=400), spoil=lambda data, to_board: [])
+    with pytest.raises(Problem, match=r"cell\.toml: boards\.b\.serial: it does not answer"):
+        made(CELL, port)
+
+
+def test_a_cell_without_pins_says_so() -> None:
+    with pytest.raises(Problem, match=r"hardware: no pin of this cell is real: add \[boards\.NAME\]"):
+        made('[units.x]\nmodel = "gs-c200"\n')
+
+
+def test_a_pace_of_its_own_is_refused() -> None:
+    with pytest.raises(Problem, match="real pins keep real time"):
+        made(CELL, pace=2)
