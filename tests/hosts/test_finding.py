@@ -147,6 +147,17 @@ def test_all_axes_of_a_party_line_are_found() -> None:
     assert not harm(cell)
 
 
+def test_an_axis_of_a_party_line_that_runs_a_program_is_found_by_the_echo_of_its_name() -> None:
+    """Pages 25 and 57: the name is echoed, so that | can follow; nothing else is."""
+    cell = jumpered({0: "low", 1: "high"}, 0, 0, party="high")
+    for line in ("\nAP 0", "AM 900", "AL 2048 0", "AP", "AG"):
+        cell.send(0, f"{line}\n".encode())
+        cell.run_to(cell.now + 200_000_000)
+    (found,) = looked_for(cell)
+    assert (found.options, found.says) == ({"mode": "party", "name": "A"}, "runs a program, or jogs")
+    assert next(iter(cell.controllers().values())).status(cell.now).state == "running"
+
+
 @pytest.mark.parametrize(("baud", "dual"), [(9600, "no"), (4800, "no"), (2400, "no"), (4800, "yes"), (2400, "yes")])
 def test_a_genstepper_board_is_found_at_each_of_its_rates(baud: int, dual: str) -> None:
     straps = {"S1K": "low"} if dual == "yes" else {}
