@@ -1,5 +1,6 @@
 """What goes wrong with a board, and the state that it ends in: what is known of the position is said."""
 
+import os
 from collections.abc import Callable
 from random import Random
 from typing import Any
@@ -263,6 +264,29 @@ def test_ports_that_cannot_be_opened(tmp_path: Any) -> None:
         open_port(str(tmp_path / "file"))
     with pytest.raises(PortError, match="no settings"):
         open_port("fake:fast")
+
+
+def test_a_port_belongs_to_one_program() -> None:
+    ours, theirs = os.openpty()
+    try:
+        first = open_port(os.ttyname(theirs))
+        with pytest.raises(PortError, match="in use by another program"):
+            open_port(os.ttyname(theirs))
+        first.close()
+        open_port(os.ttyname(theirs)).close()
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_a_host_that_slept_does_not_take_its_board_for_lost() -> None:
+    """Nobody has asked it anything meanwhile."""
+    made = bench(outs=(MOV,))
+    made.run(1 * SECOND)
+    made.turn(made.wall + 4 * SECOND)
+    made.run(100 * MS)
+    assert not made.of(Lost)
+    assert made.boards.ready
 
 
 def test_a_board_is_looked_at_and_left_as_it_was() -> None:

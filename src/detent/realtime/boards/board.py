@@ -27,7 +27,7 @@ from detent.ticks import MS, SECOND, Ns
 PIECE = 40  # bytes of the dictionary in one answer
 PROBES = 10  # round trips before anything is scheduled
 PROBE_EVERY: WallNs = 985 * MS  # afterwards; not a whole second, which other things may keep too
-SILENCE: WallNs = 2500 * MS  # a board that is asked every second and says nothing for so long is lost
+PATIENCE = 60  # times that its clock is asked again, 40 ms apart: then it is lost
 NO_ANSWER: WallNs = 5 * SECOND  # at the start
 DYING: WallNs = 700 * MS  # what a host before us has queued is over by then
 MOST_WATCHDOG = 1 << 30  # ticks: the firmware's clock has 32 bits
@@ -164,7 +164,6 @@ class Board:
         self._probe_at: WallNs | None = None
         self._probe_sent: tuple[WallNs, int] | None = None
         self._probes = 0
-        self._heard_at: WallNs = 0
         self._identity = bytearray()
         self._suppressed: dict[str, bool] = {}
         self.wants_reopening = False  # it was told to start again: its port goes away
@@ -235,7 +234,7 @@ class Board:
         core.forget_questions()
         self.state = State.CONNECTING
         self._identity.clear()
-        self._begin_at = self._heard_at = wall
+        self._begin_at = wall
         self._wait_until = self._probe_at = self._probe_sent = None
         self.wants_reopening = False
         core.link.sync(wall)
@@ -251,7 +250,6 @@ class Board:
         core = self.core
         was = core.link.synced
         for payload in core.link.receive(data, wall):
-            self._heard_at = wall
             try:
                 messages = core.dictionary.parse(payload)
             except FrameError:
@@ -261,8 +259,6 @@ class Board:
                     handler = self._handlers.get(message.name)
                     if handler is not None:
                         handler(message, wall)
-        if data:
-            self._heard_at = wall
         if core.link.synced and not was:
             core.dictionary = BARE
             self._ask_identity(wall)
@@ -276,7 +272,6 @@ class Board:
         if self.state is State.CONNECTING:
             times.append(self._begin_at + NO_ANSWER)
         if self.state is State.READY:
-            times += [self._heard_at + SILENCE]
             times += [out.deadline() for out in self.outs.values()]
             times += [axis.proof_due() for axis in self.steppers.values()]
         return min((at for at in times if at is not None), default=None)
@@ -292,7 +287,7 @@ class Board:
                          "cable, and that the firmware is flashed for this interface")  # fmt: skip
             return
         silent = core.due(wall)
-        if silent is not None or (self.state is State.READY and wall >= self._heard_at + SILENCE):
+        if silent is not None:
             self.lose("it does not answer any more", wall)
             return
         if self._wait_until is not None and wall >= self._wait_until:
@@ -411,11 +406,12 @@ class Board:
         """Ask for the clock; a round trip that was not disturbed counts."""
         core = self.core
         self._probe_at = wall + PROBE_EVERY
-        undisturbed = core.link.idle or self._probes > 0
+        if core.asking("clock", -1):
+            return  # it has not answered yet
         self._probe_sent = (wall, core.link.retransmitted)
-        core.ask("get_clock", "clock", self._clocked, wall)
+        core.ask("get_clock", "clock", self._clocked, wall, times=PATIENCE)
         core.link.flush(wall)
-        if not undisturbed or core.link.backlog:
+        if core.link.backlog:  # it has to wait itself
             self._probe_sent = None
 
     def _clocked(self, message: Message, wall: WallNs) -> None:

@@ -1,5 +1,6 @@
 """Where bytes of a board come from: a serial device, or a fake board in this process."""
 
+import fcntl
 import os
 import select
 import termios
@@ -51,6 +52,10 @@ class SerialPort:
             tty.setraw(self._descriptor)
             if not os.path.realpath(device).startswith("/dev/pts/"):
                 self._set_baud()
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            self.close()
+            raise PortError(f"{device} is in use by another program; end that first") from error
         except (OSError, termios.error, ValueError) as error:
             self.close()
             raise PortError(f"{device} is no serial device: {error}; name the board's own, as in {BY_ID}") from error
@@ -207,5 +212,8 @@ class Look:
 
 
 def candidates() -> list[str]:
-    """Serial devices of this computer that may be boards, by their by-id names."""
-    return sorted(str(path) for path in BY_ID.iterdir()) if BY_ID.is_dir() else []
+    """Devices that call themselves boards with Klipper firmware, by their by-id names.
+
+    Others are not asked: what is said to a board may mean something to whatever else is on a serial port.
+    """
+    return sorted(str(path) for path in BY_ID.iterdir() if "klipper" in path.name.lower()) if BY_ID.is_dir() else []

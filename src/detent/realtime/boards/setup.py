@@ -151,7 +151,7 @@ class BoardSetup:
         used: dict[str, str] = {}
         if self.lead < 3 * self.margin or self.margin < 1 * MS:
             raise SetupProblem(self.name, "lead", f"a lead of {self.lead / MS:g} ms is too short for a margin of "
-                               f"{self.margin / MS:g} ms: take three margins or more")  # fmt: skip
+                               f"{self.margin / MS:g} ms: take {3 * self.margin / MS:g} ms or more")  # fmt: skip
         if self.lead > SECOND // 2:
             raise SetupProblem(self.name, "lead", f"a lead of {self.lead / MS:g} ms: take 500 ms at most")
         for item in self.items():
