@@ -8,6 +8,7 @@ from tests.cell.cells import cell as built
 from detent.cell.delivery import Oscillation
 from detent.cell.description import parse
 from detent.realtime.guarded import Guarded
+from detent.realtime.picture import whole_state
 from detent.realtime.service import Service
 from detent.ticks import MS
 
@@ -73,3 +74,4 @@ def test_a_service_whose_cell_has_stopped_still_answers(tmp_path: Path) -> None:
         service.step()
         assert future.result(0) == service.cell.now
         assert service.stopped == told[0]
+        assert whole_state(service)["stopped"] == told[0]

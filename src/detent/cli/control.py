@@ -167,6 +167,8 @@ def _print(verb: str, answer: dict[str, Any]) -> None:
 def _print_state(console: "Console", answer: dict[str, Any]) -> None:
     late = answer["late_ns"]
     console.print(f"{_time(answer)}; deadlines late by {late['p99'] / 1e6:.3f} ms (99 %)", markup=False)
+    if "stopped" in answer:
+        console.print(answer["stopped"], markup=False)
     rows = []
     for name, unit in answer["units"].items():
         executing = unit.get("executing")
