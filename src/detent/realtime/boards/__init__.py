@@ -18,6 +18,11 @@ the wall clock and give bytes, so the same code runs against the fake board in v
 | `several` | all boards of a cell, one of them master of time |
 | `ports` | a serial device, or the fake board |
 | `events` | what comes back |
+| `plan`, `opening`, `drive` | a cell file's tables to setups; boards opened and ready; what a service needs |
+| `driven` | the cell behind its pins, as the loop serves it; made of the three that follow |
+| `leaving` | what the cell does, on its way out: ledgers (`channels`, `axle`), what watches (`guard`), what waits (`replies`) |
+| `taking_back` | a stop takes the cell back (`past`), and the boards are told what is different |
+| `mishaps` | faults, emergency stop, recovery; `states` is how all of it stands, for those who look |
 
 **Time.** `wall` is always the host's monotonic clock in ns. Cell time is the board's time: `Boards.now` gives its
 nanoseconds, from which a `Pace` makes cell time. What the cell does at t leaves the pins at t + lead.

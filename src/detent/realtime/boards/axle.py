@@ -21,6 +21,7 @@ class Axle:
         self.motions: Channel[Motion] = Channel()
         self.standing, self.why, self.known = Standing.WAITING, "", True
         self.stops = 0
+        self.rested: Ns | None = 0  # since when it is at rest; None while it moves
         self._shaft = shaft  # at rest
 
     @property
@@ -41,6 +42,7 @@ class Axle:
     def take(self, entry: Motion) -> None:
         """The axis did this."""
         motion = self.motion
+        self.rested = None if isinstance(entry, MotionStarted) else entry.at
         if isinstance(entry, MotionStarted):
             self._shaft = entry.shaft
         elif motion is not None:

@@ -1,0 +1,331 @@
+"""What a cell does, on its way out: motions to steppers, levels to outputs, currents to drivers, words to hosts.
+
+Everything is numbered as it is told, so that it can be taken back; and whatever moves, the firmware watches the inputs
+that would cut it.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+
+from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.cell.cell import Cell
+from detent.cell.deeds import SetPin
+from detent.cell.recording import Batch
+from detent.controllers.device import DriveSet, Powered, Stage, StageSet
+from detent.pins import Level, PinSet
+from detent.realtime.boards.axle import Axle
+from detent.realtime.boards.board import State
+from detent.realtime.boards.channels import Channel
+from detent.realtime.boards.clock import Clock
+from detent.realtime.boards.guard import Guard
+from detent.realtime.boards.past import Past
+from detent.realtime.boards.plan import Plan
+from detent.realtime.boards.replies import HeldLine, HeldStores
+from detent.realtime.boards.setup import SetupProblem
+from detent.realtime.boards.several import Boards
+from detent.realtime.boards.states import News, Standing, Weight
+from detent.realtime.pace import Pace, WallNs
+from detent.ticks import MS, Ns
+
+CERTAIN: Ns = 5 * MS  # a stop is known so long after it happened
+KEEP: Ns = 50 * MS  # between two moments to which the cell can be taken back, while a stop is armed
+
+
+class Out:
+    """An output pin of a unit on a board: what the cell made of it is a channel."""
+
+    def __init__(self, name: str, unit: int) -> None:
+        self.name, self.unit = name, unit
+        self.levels: Channel[tuple[Ns, bool]] = Channel()
+
+
+class Leaving:
+    """`cell` and its boards. See `driven.Driven`, which is made of this and what stands on it."""
+
+    def __init__(
+        self,
+        cell: Cell,
+        boards: Boards,
+        plan: Plan,
+        stores: HeldStores,
+        *,
+        wall: Callable[[], WallNs] = time.monotonic_ns,
+        tell: Callable[[News], None] = lambda news: None,
+    ) -> None:
+        assert cell.recording is not None
+        self.cell, self.boards, self.plan, self._wall, self._tell = cell, boards, plan, wall, tell
+        self._stores = stores
+        stores.now, stores.holding, stores.failed = lambda: cell.now, lambda: self._guarded, self._not_written
+        self._outs: dict[tuple[int, str], Out] = {
+            (cell.unit(unit), pin): Out(name, cell.unit(unit)) for (unit, pin), name in plan.outs.items()
+        }
+        self.axles = [
+            Axle(what, boards.steppers[what.stepper], Guard(boards.stops[what.stepper]), what.shaft)
+            for what in plan.axes
+        ]
+        for owner, pin in plan.outs:
+            cell.parts[cell.unit(owner)].watch(pin)  # of a winding, or of a pulse, every level is told
+        self._by_stepper = {axle.name: axle for axle in self.axles}
+        self._of_unit: dict[int, list[Axle]] = {}
+        for axle in self.axles:
+            self._of_unit.setdefault(cell.unit(axle.what.unit), []).append(axle)
+            if axle.what.enable:
+                unit = cell.unit(axle.what.unit)
+                self._outs[unit, axle.what.enable] = Out(axle.what.enable, unit)
+        self._input_of = {place: name for name, place in plan.inputs.items()}
+        self._raw: dict[str, Level] = {}  # as the boards last said
+        self._given: dict[str, Level] = {}  # as the cell was told
+        self._reports: deque[tuple[Ns, SetPin, Ns]] = deque(maxlen=256)  # what inputs gave, and the board's time of it
+        self._align = 0  # of `clock` at cell time 0
+        self._shift = 0  # of `clock` from the master's time
+        self._clock: Clock | None = None  # of the master, as it was last looked at
+        self._known: tuple[WallNs, Ns] = (wall(), 0)  # the last time that the master told
+        self.lines = [HeldLine(cell, number, self._horizon) for number in range(len(cell.lines))]
+        self.past = Past(cell, self._counts)
+        self._committed: WallNs = 0
+        self._pending = True  # something was told that no commit has followed
+        self._stages: dict[str, Stage] = {}
+        self._halved: dict[str, bool] = {}  # whether a plain driver is told to give half of its current
+        self.on_moving: Callable[[bool], None] = lambda moving: None  # something begins to move, or all is at rest
+        self._was_moving = False
+        self.abandoned = False  # the cell cannot go on, and so nothing is done for it any more
+        self.escaped = 0  # characters that hosts heard though they were taken back
+        self.rewinds = 0
+        self.longest_rewind: WallNs = 0
+
+    def begin(self, pace: Pace, inputs: Mapping[str, Level]) -> None:
+        """The cell's present is the boards' present; `inputs` are what the cell was built with."""
+        self._raw, self._given = dict(inputs), dict(inputs)
+        self.align(pace)
+        for axle in self.axles:
+            axle.stepper.adopt(axle.shaft_at(self.cell.now))
+            axle.standing = Standing.DRIVEN
+        for unit, pin in self._outs:
+            self._level(unit, pin, False, self.cell.now)  # until the recording tells better
+        self._absorb()
+        self.past.keep()
+
+    def align(self, pace: Pace) -> None:
+        """The cell's present is now."""
+        pace.restart(self.cell.now)
+        began = pace.due(self.cell.now)
+        assert began is not None
+        self._align = began - self.cell.now
+        self.boards.align(self.cell.now, began - self._shift)
+
+    def clock(self) -> Ns:
+        """The time of the master board, for the pace of the cell; without it, the host's from there on.
+
+        A board that comes back counts from elsewhere: its time is joined on to the one that went on meanwhile.
+        """
+        wall, master = self._wall(), self.boards.master
+        now = self._known[1] + wall - self._known[0]
+        if master.state in (State.READY, State.SHUT_DOWN):
+            if master.core.clock is not self._clock:
+                raw = self.boards.ns_at(wall)
+                if self._clock is not None:
+                    self._shift = now - raw
+                    self.boards.align(now - self._align, raw)
+                self._clock = master.core.clock
+            now = self.boards.ns_at(wall) + self._shift
+            self._known = wall, now
+        return now
+
+    def commit(self) -> None:
+        """Give the boards what is certain, at once."""
+        self._committed = self._wall()
+        self.boards.commit(self.cell.now, self._committed)
+        self._pending = False
+
+    @property
+    def _guarded(self) -> bool:
+        return any(axle.guard.armed for axle in self.axles)
+
+    @property
+    def lag(self) -> Ns:
+        """How much later than the lead the pins are at present: the latest axis."""
+        return max((axle.stepper.lag for axle in self.axles), default=0)
+
+    @property
+    def _behind(self) -> Ns:
+        """So long after the cell said something it is certain."""
+        return self.plan.lead + self.lag + CERTAIN if self.plan.held else 0
+
+    def _horizon(self) -> Ns:
+        return self.cell.now - self._behind
+
+    def _counts(self) -> tuple[int, ...]:
+        return (
+            *(axle.motions.count for axle in self.axles),
+            *(out.levels.count for out in self._outs.values()),
+            *(line.count for line in self.lines),
+            self._stores.count,
+        )
+
+    def _absorb(self) -> None:
+        """Take over what the cell did, tell the boards of it, and arm what would stop it."""
+        changed = self._take(self._batches(), tell=True)
+        for line in self.lines:
+            line.absorb()
+        if not changed:
+            return
+        self._pending = True
+        at_fault = {
+            axle.what.unit for axle in self.axles if axle.standing is Standing.FAULT and axle.motion is not None
+        }
+        for unit in at_fault:
+            self.cell.halt(unit)
+        if at_fault:
+            self._take(self._batches(), tell=True)
+        self._arm()
+
+    def _batches(self) -> Sequence[Batch]:
+        assert self.cell.recording is not None
+        return self.cell.recording.take()
+
+    def _take(self, batches: Sequence[Batch], *, tell: bool) -> bool:
+        """Note what the units did, and tell the boards. Whether anything that concerns them is among it."""
+        found = False
+        for unit, entries in batches:
+            axles = self._of_unit.get(unit)
+            for entry in entries:
+                if isinstance(entry, (MotionStarted, MotionCut, MotionEnded)):
+                    for axle in axles or ():
+                        if axle.what.axis == entry.axis:
+                            axle.take(entry)
+                            found = True
+                            if tell and axle.standing is not Standing.FAULT:
+                                axle.stepper.tell(entry)
+                elif isinstance(entry, PinSet):
+                    if (unit, entry.pin) in self._outs:
+                        self._level(unit, entry.pin, bool(entry.level), entry.at, tell=tell)
+                        found = True
+                elif isinstance(entry, Powered):
+                    self._powered(unit, entry, tell=tell)
+                    found = True
+                elif isinstance(entry, (StageSet, DriveSet)):
+                    self._staged(unit, entry)
+            found = found or axles is not None
+        return found
+
+    def _powered(self, unit: int, entry: Powered, *, tell: bool) -> None:
+        for axle in self._of_unit.get(unit, ()):
+            if axle.what.enable:
+                self._level(unit, axle.what.enable, entry.on, entry.at, tell=tell)
+        if not entry.on:
+            controller = self.cell.parts[unit]
+            rests = {pin.name: pin for pin in controller.pins}
+            for place, pin in list(self._outs):
+                if place == unit and pin in rests:
+                    self._level(unit, pin, self._off(out=self._outs[unit, pin]), entry.at, tell=tell)
+
+    def _off(self, out: Out) -> bool:
+        for setup, _ in self.plan.setups:
+            for each in setup.outs:
+                if each.name == out.name:
+                    return each.off
+        return False
+
+    def _level(self, unit: int, pin: str, level: bool, at: Ns, *, tell: bool = True) -> None:
+        out = self._outs[unit, pin]
+        out.levels.append((at, level))
+        if tell:
+            self._set(out, level, at)
+
+    def _set(self, out: Out, level: bool, at: Ns) -> None:
+        axles = self._of_unit.get(out.unit, ())
+        if any(axle.what.enable == out.name and axle.standing is Standing.FAULT for axle in axles):
+            return
+        self.boards.outs[out.name].set(level, at, max((axle.stepper.lag for axle in axles), default=0))
+        self._pending = True
+
+    def _staged(self, unit: int, entry: StageSet | DriveSet) -> None:
+        stage = entry.stage if isinstance(entry, StageSet) else getattr(entry.drive, "stage", None)
+        for axle in self._of_unit.get(unit, ()):
+            if axle.what.axis == entry.axis and stage is not None and self._stages.get(axle.name) != stage:
+                self._stages[axle.name] = stage
+                self._command(axle)
+
+    def _command(self, axle: Axle) -> None:
+        """Tell the driver of an axis its current."""
+        stage = self._stages.get(axle.name)
+        if stage is None:
+            return
+        if axle.what.driver:
+            try:
+                self.boards.drivers[axle.what.driver].command(stage)
+            except SetupProblem as problem:
+                self._fault(axle, str(self.plan.problem(problem)))
+
+    def _currents(self) -> None:
+        """Tell plain drivers whether half of the current is enough: from before the first step to behind the last."""
+        now = self.cell.now
+        for axle in self.axles:
+            if not axle.what.half or axle.standing is Standing.FAULT:
+                continue
+            stage = self._stages.get(axle.name)
+            over = axle.rested is not None and now >= axle.rested + self.plan.lead + axle.stepper.lag
+            if stage is None:
+                half = over
+            else:
+                holds = over and stage.settling > 0 and axle.rested is not None and now >= axle.rested + stage.settling
+                full = max(stage.run, stage.hold) if stage.chops else 1.0
+                half = (stage.hold if holds else stage.run) <= full / 2
+            if self._halved.get(axle.name) is not half:
+                self._halved[axle.name] = half
+                self.boards.outs[axle.what.half].now(half)
+                self._pending = True
+
+    def _arm(self) -> None:
+        """Let the firmware watch the inputs that would cut what is under way."""
+        now, kept = self.cell.now, False
+        for axle in self.axles:
+            if axle.standing is not Standing.DRIVEN:
+                continue
+            motion = axle.motion
+            inputs: dict[str, Level] = {}
+            if motion is not None:
+                controller = self.cell.controller(axle.what.unit)
+                for stop in controller.cuts(now, axle.what.axis):
+                    name = self._input_of.get((axle.what.unit, stop.pin))
+                    if name is not None and self.plan.board_of[name] == axle.what.board:
+                        inputs[name] = stop.level
+            if inputs != axle.guard.wanted:
+                at = motion.at if motion is not None and not axle.guard.armed else now
+                axle.guard.want(inputs, at, self.plan.lead + axle.stepper.lag)
+                self._pending = True
+                if inputs and not kept:
+                    self.past.keep()
+                    kept = True
+        if not kept and self._guarded and (not self.past.moments or now - self.past.moments[-1].now >= KEEP):
+            self.past.keep()
+
+    def _refresh(self) -> None:
+        for axle in self.axles:
+            if axle.guard.next <= self.cell.now:
+                axle.guard.refresh(self.cell.now, self.cell.now)
+        self._arm()
+
+    def _give(self, name: str, level: Level, board_ns: Ns) -> None:
+        """An input has another level, as far as the cell is concerned from now on."""
+        unit, pin = self.plan.inputs[name]
+        self._given[name] = level
+        self._reports.append((self.cell.now, SetPin(unit, pin, level), board_ns))
+        self.cell.set_pin(unit, pin, level)
+        self._absorb()
+
+    def _say(self, weight: Weight, text: str) -> None:
+        self._tell(News(self.cell.now, weight, text))
+
+    def _fault(self, axle: Axle, why: str, *, known: bool = True) -> None:
+        """An axis does not move any more."""
+        raise NotImplementedError
+
+    def _place(self, axle: Axle, shaft: int) -> None:
+        """The motor of an axis stands at `shaft`."""
+        raise NotImplementedError
+
+    def _not_written(self, unit: str) -> None:
+        """An image could not be stored after all."""
+        raise NotImplementedError

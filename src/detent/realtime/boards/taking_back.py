@@ -1,0 +1,170 @@
+"""A stop in the firmware takes the cell back to where it happened, and the boards are told what is different since."""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.cell.deeds import Action, Deed, SetPin
+from detent.cell.recording import Batch
+from detent.controllers.device import Powered
+from detent.lines.line import Heard
+from detent.pins import PinSet
+from detent.realtime.boards.axle import Axle, Motion
+from detent.realtime.boards.channels import alike
+from detent.realtime.boards.events import (
+    Stopped,
+)
+from detent.realtime.boards.leaving import Leaving, Out
+from detent.realtime.boards.past import Moment
+from detent.realtime.boards.states import Standing, Weight
+from detent.ticks import Ns
+
+
+class TakingBack(Leaving):
+    """What is done when the firmware has stopped an axis."""
+
+    def _stopped(self, event: Stopped) -> None:
+        """The firmware has stopped an axis: the cell is taken back to there."""
+        began = self._wall()
+        axle = self._by_stepper[event.stepper]
+        axle.guard.fired()
+        axle.stops += 1
+        self.rewinds += 1
+        unit, pin = self.plan.inputs[event.input]
+        at = axle.instant_of(event.shaft, event.at)
+        if not self.past.reaches(at):
+            at = self.past.moments[0].now if self.past.moments else self.cell.now
+        at = min(at, self.cell.now)
+        # what the machine's other inputs are at was so at the stop already: motors stand, and reports take their time
+        others = {name: int(found) for name, found in event.levels.items() if name != event.input}
+        late = {self.plan.inputs[name] for name in others}
+        fresh = {(set_.unit, set_.pin) for when, set_, _ in self._reports if when > at}
+        deeds: list[Deed] = []
+        for name, found in others.items():
+            place = self.plan.inputs[name]
+            if place in fresh or self._given[name] != found:
+                deeds.append(SetPin(*place, found))
+                self._raw[name] = self._given[name] = found
+        level = int(event.level)
+        deeds.append(SetPin(unit, pin, level))
+        drop = {(when, set_) for when, set_, _ in self._reports if when > at and (set_.unit, set_.pin) in late}
+        self._reports = deque((item for item in self._reports if item[:2] not in drop), maxlen=256)
+        self._take_back(axle, at, deeds, lambda action: (action.at, action.deed) in drop, event.shaft)
+        self._raw[event.input], self._given[event.input] = int(event.present), level
+        if int(event.present) != level:
+            self._give(event.input, int(event.present), self.clock())
+        self._arm()
+        self.commit()
+        self.longest_rewind = max(self.longest_rewind, self._wall() - began)
+
+    def _take_back(
+        self, stopped: Axle, at: Ns, deeds: Sequence[Deed], drop: Callable[[Action], bool], shaft: int
+    ) -> None:
+        """The cell lives on from `at`, where `deeds` are done; tell the boards only what is different."""
+        motions: dict[str, list[Motion]] = {}
+        levels: dict[str, list[tuple[Ns, bool]]] = {}
+        counts: list[int] = []
+        places: dict[str, int] = {}
+        if not self.past.moments:
+            self.past.keep()
+
+        def arrived(moment: Moment) -> None:
+            """The cell is at `at` again: what it did up to there was told before."""
+            batches = self._batches()
+            ahead = list(moment.counts)
+            for place, axle in enumerate(self.axles):
+                ahead[place] += sum(
+                    isinstance(entry, (MotionStarted, MotionCut, MotionEnded)) and entry.axis == axle.what.axis
+                    for unit, entries in batches
+                    if axle in self._of_unit.get(unit, ())
+                    for entry in entries
+                )
+            counts.extend(ahead[: len(self.axles)])
+            for axle, count in zip(self.axles, counts, strict=True):
+                before = axle.motions.before(count)
+                motions[axle.name] = axle.take_back(count, _rests(before, axle.shaft_at(at)))
+            place = len(self.axles)
+            for out in self._outs.values():
+                count = moment.counts[place] + self._levels_in(batches, out)
+                levels[out.name], places[out.name] = out.levels.cut(count), count
+                place += 1
+            for number in range(len(self.lines)):
+                heard = self.cell.lines[number].take()
+                counts.append(moment.counts[place] + len(heard))
+                place += 1
+            self._stores.cut()
+
+        self._stores.count = [m for m in self.past.moments if m.now <= at][-1].counts[-1]
+        self.past.back(at, deeds, drop, arrived)
+        self._take(self._batches(), tell=False)
+        heard: list[list[Heard]] = [self.cell.lines[number].take() for number in range(len(self.lines))]
+        for line, count, new in zip(self.lines, counts[len(self.axles) :], heard, strict=True):
+            for wrong, right in line.rewind(count, new):
+                self.escaped += 1
+                instead = "" if right is None else f"; it would be {right.char.value:#04x}"
+                what = f"a host heard {wrong.char.value:#04x} of {wrong.at / 1e9:.4f} s before a stop took it back"
+                self._say(Weight.WARNING, what + instead)
+        self._tell_axles(stopped, shaft, motions, counts)
+        self._arm()  # before any pulse leaves
+        self.commit()
+        for out in self._outs.values():
+            self._tell_out(out, levels[out.name], out.levels.since(places[out.name]), at, stopped)
+        self._pending = True
+
+    def _levels_in(self, batches: Sequence[Batch], out: Out) -> int:
+        """How many items of the channel of an output these entries make."""
+        count = 0
+        for unit, entries in batches:
+            if unit != out.unit:
+                continue
+            for entry in entries:
+                if isinstance(entry, PinSet):
+                    count += self._outs.get((unit, entry.pin)) is out
+                elif isinstance(entry, Powered):
+                    enables = any(axle.what.enable == out.name for axle in self._of_unit.get(unit, ()))
+                    count += enables or not entry.on
+        return count
+
+    def _tell_axles(self, stopped: Axle, shaft: int, old: dict[str, list[Motion]], counts: Sequence[int]) -> None:
+        now = self.cell.now
+        for axle, count in zip(self.axles, counts, strict=False):
+            new = axle.motions.since(count)
+            if axle.standing is not Standing.DRIVEN:
+                continue
+            if axle is not stopped:
+                lost = axle.tell_difference(old[axle.name], new, now)
+                if lost:
+                    self._contradicted(axle, stopped, lost)
+                continue
+            axle.stepper.rewind(shaft)
+            force = axle.motion_after(count)
+            if force is not None:
+                axle.stepper.tell(force)
+            for motion in new:
+                axle.stepper.tell(motion)
+
+    def _tell_out(
+        self, out: Out, old: list[tuple[Ns, bool]], new: list[tuple[Ns, bool]], at: Ns, stopped: Axle
+    ) -> None:
+        mine = out.unit == self.cell.unit(stopped.what.unit)
+        same = alike(old, new)
+        if not mine and same == len(old):
+            for when, level in new[same:]:
+                self._set(out, level, when)
+            return
+        self.boards.outs[out.name].rewind(at)
+        for when, level in new:
+            self._set(out, level, when)
+
+    def _contradicted(self, axle: Axle, stopped: Axle, lost: int) -> None:
+        """Pulses left that the cell did not give after all: it is told where the motor is, and the axis stands."""
+        what = f"{lost} steps left the pins though a stop of {stopped.name} took them back"
+        self._fault(axle, f"{what}: wires of the cell make it follow too closely; the counter says where it stands")
+        self._place(axle, axle.stepper.shaft)
+
+
+def _rests(before: Sequence[Motion], shaft: int) -> int:
+    """Where an axis is at rest behind these entries; `shaft` if they say nothing of it."""
+    if len(before) >= 2 and not isinstance(before[-1], MotionStarted) and isinstance(before[-2], MotionStarted):
+        return before[-2].shaft + before[-2].direction * before[-1].last
+    return shaft
