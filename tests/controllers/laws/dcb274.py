@@ -165,8 +165,9 @@ class Axis:
                 rates = draw.choice((("M 5000", "M -3000"), ("M -9000", "M 900")))
                 return [slope, Wait(2 * MS), Say(rates[0]), Wait(draw.randrange(900) * MS), Say(rates[1]),
                         Wait(draw.randrange(60) * MS)]  # fmt: skip
-            case 4:  # the current has fallen to hold: w waits (page 51)
-                return [Say("w 20"), Wait(1200 * MS), Say(draw.choice(MOVES)), Wait(10 * MS)]
+            case 4 | 7:  # the current has fallen to hold: w waits (page 51)
+                begun = draw.choice((Say(draw.choice(MOVES)), Say(draw.choice(MOVES)), Put("JOG1", LOW)))
+                return [Say("w 20"), Wait(1200 * MS), begun, Wait(10 * MS)]
             case 1:
                 return [Raw(b"\x03"), *self.ready()]
             case 2:
@@ -217,7 +218,8 @@ class Axis:
             Stop("M 0", "46", lambda bench: [Say("M 0")], soft_behind_a_ramp,
                  lambda bench: listens(bench) and not busy(bench) and bench.device._motion.status != 1),  # type: ignore[attr-defined]
             Stop("let go", "28, 36", self.let_go, soft,
-                 lambda bench: bool(bench.device._motion.jogging), holding=True),  # type: ignore[attr-defined]
+                 lambda bench: any(bench.level(key) == LOW for key in ("JOG1", "JOG2"))
+                 and bool(bench.device._motion.jogging), holding=True),  # type: ignore[attr-defined]
             Stop("limit", "7, 46", lambda bench: [Put(ahead(bench), LOW)],
                  lambda bench: soft(bench) if flags(bench) & GENTLE else 0, alone),
         )  # fmt: skip
@@ -229,7 +231,7 @@ class Axis:
             case "M 0":
                 return phase in ("rest", "speeding up", "at speed", "slowing", "turning", "pre-energizing")
             case "let go":
-                return phase in ("jogging", "pre-energizing", "at speed", "slowing")
+                return phase in ("jogging", "pre-energizing")
             case "limit":
                 return phase not in ("rest", "a program at rest", "a program moving", "pending", "turning", "jogging")
         return phase != "jogging"
