@@ -240,3 +240,135 @@ def test_the_tail_of_a_motion_is_watched_until_it_has_left() -> None:
             assert max(place for _, place in bench.edges("x")) <= 200
             assert bench.position("x") == bench.driven.axes()[0].shaft
             assert bench.driven.axes()[0].standing is Standing.DRIVEN
+
+
+SLAVE = """
+[units.x]
+model = "dcb-274"
+options = { name = "X" }
+[units.y]
+model = "dcb-274"
+options = { name = "Y" }
+[[wires]]
+from = "x.P4"
+to = "y.STEP"
+[[wires]]
+from = "x.P5"
+to = "y.DIR"
+[boards.b]
+serial = "fake"
+[hardware.x]
+board = "b"
+step = "gpio2"
+dir = "gpio3"
+inputs = { LIMIT-A = "^gpio10", LIMIT-B = "^gpio11", HOME = "^gpio12" }
+[hardware.y]
+board = "b"
+step = "gpio4"
+dir = "gpio5"
+unwired = ["LIMIT-A", "LIMIT-B", "HOME"]
+"""
+
+
+def test_an_axis_that_follows_another_through_the_cell_stands_with_its_true_count() -> None:
+    """Steps of the slave have left when its master is stopped: they are counted, and it stands until somebody looks."""
+    with Bench(SLAVE, switches={"x.LIMIT-A": ("x", 120, 10**6)}) as bench:
+        bench.run(100 * MS)
+        for unit, line in (("x", " "), ("x", "l 2"), ("x", "M 800")):
+            bench.type(unit, line)
+            bench.run(100 * MS)
+        bench.run(800 * MS)
+        bench.rest()
+        assert bench.position("x") == 120
+        x, y = bench.driven.axes()
+        assert x.standing is Standing.DRIVEN
+        assert y.shaft == bench.position("y")
+        if y.shaft != 120:
+            assert y.standing is Standing.FAULT
+            assert "took them back" in y.why
+            assert bench.cell.controller("y").status(bench.cell.now).position == y.shaft
+            bench.driven.recover()
+            bench.run(100 * MS)
+        bench.type("x", "-20")
+        bench.run(500 * MS)
+        bench.rest()
+        assert bench.position("x") == 100
+        assert bench.position("y") == bench.driven.axes()[1].shaft == y.shaft - 20
+
+
+BOARDS = """
+[units.x]
+model = "gs-c200s"
+straps = { CHS = "low" }
+[units.y]
+model = "gs-c200s"
+straps = { CHS = "low" }
+[boards.left]
+serial = "one"
+[boards.right]
+serial = "two"
+[hardware.x]
+board = "left"
+step = "!gpio2"
+dir = "gpio3"
+inputs = { EOT = "^gpio10", HOME = "^gpio11" }
+[hardware.y]
+board = "right"
+step = "!gpio2"
+dir = "gpio3"
+inputs = { EOT = "^gpio10", HOME = "^gpio11" }
+"""
+
+
+def test_two_boards_keep_one_time_and_one_may_fail() -> None:
+    switches = {"x.EOT": ("x", 90, 10**6), "x.HOME": ("x", -9, 9), "y.EOT": ("y", 140, 10**6), "y.HOME": ("y", -9, 9)}
+    with Bench(BOARDS, switches=switches) as bench:
+        bench.driven._forget = lambda: None  # type: ignore[method-assign]
+        bench.run(100 * MS)
+        for unit in "xy":
+            bench.type(unit, "S20")
+            bench.run(10 * MS)
+            bench.type(unit, "H+")
+        bench.run(2 * SECOND)
+        bench.rest()
+        assert bench.position("x") == bench.position("y") == 9
+        assert (same_pulses(bench, "x", "x"), same_pulses(bench, "y", "y")) == (90 + 81, 140 + 131)
+        assert bench.driven.rewinds == 4
+        bench.type("x", "+400")
+        bench.type("y", "+400")
+        bench.run(200 * MS)
+        bench.ports["right"].unplugged = True
+        bench.run(2 * SECOND)
+        bench.rest()
+        x, y = bench.driven.axes()
+        assert (x.standing, y.standing) == (Standing.DRIVEN, Standing.FAULT)
+        assert bench.position("x") == 409 == x.shaft
+        bench.ports["right"].unplugged = False
+        bench.driven.recover()
+        bench.run(5 * SECOND)
+        assert bench.driven.axes()[1].standing is Standing.DRIVEN
+        bench.type("y", "-5")
+        bench.rest()
+        assert bench.position("y") == bench.driven.axes()[1].shaft
+
+
+def test_the_master_of_time_may_come_back() -> None:
+    """Cell time goes on while the board that keeps it is away, and behind it."""
+    with Bench(BOARDS) as bench:
+        bench.run(100 * MS)
+        bench.ports["left"].unplugged = True
+        bench.run(1 * SECOND)
+        before = bench.cell.now
+        assert 900 * MS < before < 1300 * MS
+        bench.ports["left"].board.clear()
+        bench.ports["left"].unplugged = False
+        bench.driven.recover()
+        bench.run(3 * SECOND)
+        assert bench.driven.axes()[0].standing is Standing.DRIVEN
+        assert abs(bench.cell.now - before - 3 * SECOND) < 50 * MS
+        for unit in "xy":
+            bench.type(unit, "+30")
+        bench.run(1 * SECOND)
+        bench.rest()
+        assert (bench.position("x"), bench.position("y")) == (30, 30)
+        assert not [news for news in bench.news if "slipped" in news.text]

@@ -20,7 +20,7 @@ the wall clock and give bytes, so the same code runs against the fake board in v
 | `events` | what comes back |
 | `plan`, `opening`, `drive` | a cell file's tables to setups; boards opened and ready; what a service needs |
 | `driven` | the cell behind its pins, as the loop serves it; made of the three that follow |
-| `leaving` | what the cell does, on its way out: ledgers (`channels`, `axle`), what watches (`guard`), what waits (`replies`) |
+| `leaving` | what the cell does, on its way out: `channels`, `axle`; who watches (`guard`), what waits (`replies`) |
 | `taking_back` | a stop takes the cell back (`past`), and the boards are told what is different |
 | `mishaps` | faults, emergency stop, recovery; `states` is how all of it stands, for those who look |
 

@@ -119,13 +119,16 @@ class Axle:
 def _pulses(force: MotionStarted | None, told: list[Motion], after: Ns, until: Ns) -> list[tuple[Ns, int]]:
     """Time and direction of the pulses behind `after` and up to `until`, with `force` in force at `after`."""
     found: list[tuple[Ns, int]] = []
-    current, last = force, after
+    current, low = force, 0 if force is None else _given(force, after)
     for motion in (*told, None):
-        end = until if motion is None else motion.at
         if current is not None:
-            low = max(_given(current, last), current.first - 1)
-            found += [(current.train.time_of(n), current.direction) for n in range(low + 1, _given(current, end) + 1)]
-        current, last = (motion if isinstance(motion, MotionStarted) else None), end
+            if isinstance(motion, MotionStarted):
+                last = motion.first - 1
+            else:
+                last = _given(current, until) if motion is None else motion.last
+            found += [(current.train.time_of(n), current.direction) for n in range(low + 1, last + 1)]
+        current = motion if isinstance(motion, MotionStarted) else None
+        low = 0 if current is None else current.first - 1
     return found
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from detent.realtime.boards.leaving import CERTAIN
 from detent.realtime.boards.mishaps import Mishaps
 from detent.realtime.boards.several import COMMIT_EVERY
-from detent.realtime.boards.states import AxisState, BoardState
+from detent.realtime.boards.states import AxisState, BoardState, Standing
 from detent.ticks import MS, NEVER, Ns
 from detent.uart import Chars
 
@@ -98,12 +98,22 @@ class Driven(Mishaps):
             self.commit()
             for event in self.boards.events():
                 self._happened(event)
+        self._prove()
         self._stores.flush(self._horizon())
         self._forget()
         moving = any(axle.motion is not None for axle in self.axles)
         if moving is not self._was_moving:
             self._was_moving = moving
             self.on_moving(moving)
+
+    def _prove(self) -> None:
+        """At rest a stepper has been told of all pulses that the cell gave, and of no others: whatever befell it."""
+        for axle in self.axles:
+            if axle.standing is Standing.DRIVEN and axle.motion is None and axle.stepper.resting:
+                sent, here = axle.stepper.shaft, axle.shaft_at(self.cell.now)
+                if sent != here and not self._pending:
+                    self._fault(axle, f"{sent} steps were sent where the cell has {here}")
+                    self._place(axle, sent)
 
     def _forget(self) -> None:
         oldest = self.past.forget(self.cell.now - self.plan.lead - self.lag - CERTAIN - SLACK)
