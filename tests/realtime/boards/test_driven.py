@@ -1,5 +1,7 @@
 """A cell behind its pins, case by case: outputs, inputs, holds, held replies, memory, slips, failures, recovery."""
 
+from random import Random
+
 import pytest
 from tests.realtime.boards.driven_bench import Bench, pulses
 
@@ -372,3 +374,90 @@ def test_closing_switches_the_drivers_off(power: bool) -> None:
         bench.driven.close()
         bench.ports["b"].run_to(bench.wall + SECOND)
         assert bench.machines["b"].outputs["gpio4"] is True
+
+
+def holds(seed: int) -> None:
+    """A random move with ENABLE, a limit or both pressed and let go at random times."""
+    random = Random(seed)
+    lead = random.choice([4, 8, 15, 30, 50])
+    speed = random.choice([2, 10, 40, 100, 400])
+    text = CELL.replace('lead = "30 ms"', f'lead = "{lead} ms"')
+    with Bench(text, jitter=lambda: random.randrange(300 * US)) as bench:
+        bench.driven._forget = lambda: None  # type: ignore[method-assign]
+        bench.run(100 * MS)
+        for line in (f"S{speed}", "T500", f"R{random.choice([1, 20, 200])}"):
+            bench.type("x", line)
+            bench.run(15 * MS)
+        steps = random.randrange(5, 40 * speed)
+        bench.type("x", f"{random.choice('+-')}{min(steps, 4000)}")
+        low: list[tuple[Ns, Ns]] = []
+        for _ in range(random.randrange(1, 5)):
+            bench.run(random.randrange(1, 300 * MS))
+            bench.press("x.ENABLE", 0)
+            begin = bench.wall
+            bench.run(random.choice([100 * US, 3 * MS, 20 * MS, 200 * MS]) + random.randrange(MS))
+            bench.press("x.ENABLE", 1)
+            low.append((begin, bench.wall))
+            if random.random() < 0.2:
+                bench.type("x", random.choice("KZ"))
+        bench.run(50 * MS)
+        bench.rest()
+        state = bench.driven.axes()[0]
+        assert not [news for news in bench.news if news.weight is not Weight.NOTE], bench.news
+        told = pulses(bench.driven.axles[0].motions.since(0), bench.cell.now)
+        edges = bench.edges("x")
+        assert [place for _, place in edges] == [place for _, place in told]
+        assert bench.position("x") == state.shaft
+        port = bench.ports["b"]
+
+        for begin, end in low:
+            walls = [port.wall_at(tick) for tick, _ in edges]
+            assert not [at for at in walls if begin + 150 * US < at < end], "no step while it is held"
+
+
+def test_holds_at_any_time_lose_no_step() -> None:
+    for seed in range(12):
+        holds(seed)
+
+
+@pytest.mark.slow
+def test_many_holds_lose_no_step() -> None:
+    for seed in range(100, 300):
+        holds(seed)
+
+
+def test_a_cell_that_cannot_go_on_stops_its_boards() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+2000")
+        bench.run(300 * MS)
+        bench.driven.abandon("the cell has stopped: an oscillation")
+        bench.run(200 * MS)
+        assert bench.boards.boards["b"].state.value == "shut down"
+        assert bench.driven.axes()[0].why == "the cell has stopped: an oscillation"
+        place = bench.position("x")
+        bench.run(1 * SECOND)
+        assert bench.position("x") == place
+
+
+def test_a_driver_that_does_not_answer_is_a_fault_of_its_axis() -> None:
+    """A DCB-274 commands amperes; the chip that should take them is not there."""
+    text = DCB + 'driver = { kind = "tmc2209", uart = "gpio20", sense = 0.05 }\n'
+    with Bench(text) as bench:
+        bench.run(3 * SECOND)
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.FAULT
+        assert "its driver: " in state.why
+
+
+def test_a_plain_driver_gets_half_of_its_current_at_rest() -> None:
+    text = CELL.replace('enable = "!gpio4"', 'enable = "!gpio4"\ndriver = { kind = "plain", half = "gpio20" }')
+    with Bench(text) as bench:
+        bench.run(300 * MS)
+        bench.type("x", "+100")
+        bench.rest()
+        (full, first), (half, second) = levels(bench, "gpio20")[-2:]
+        assert (first, second) == (False, True)
+        edges = [bench.boards.boards["b"].core.scale.time(tick) for tick, _ in bench.edges("x")]
+        assert full < edges[0]
+        assert half > edges[-1]
