@@ -136,7 +136,7 @@ class Host:
     def until(self, done: Callable[[], bool], most: float = 20.0) -> None:
         end = time.monotonic() + most
         while not done():
-            assert time.monotonic() < end, self.events
+            assert time.monotonic() < end, [event for event in self.events if not isinstance(event, Stopped)][-6:]
             assert not self.of(Refusal), self.events
             self.turn()
 
@@ -154,6 +154,8 @@ class Host:
 
     def rest(self) -> None:
         self.until(lambda: not self.axis.moving, 120)
+        stepper = self.boards.steppers["slide"]
+        self.until(lambda: stepper.over(self.machine.wall()))
         self.run(0.2)
 
     def stop_at(self, stop: Stopped, started: MotionStarted) -> None:

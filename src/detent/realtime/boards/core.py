@@ -86,6 +86,10 @@ class Core:
         """The first tick for which something may still be sent at `wall`."""
         return self.clock.tick_at(wall) + self.ticks(self.setup.margin)
 
+    def unhurried(self, wall: WallNs) -> int:
+        """A tick for what has no time of its own: a lead from now, so that a host which is kept away is not late."""
+        return self.clock.tick_at(wall) + self.ticks(self.setup.lead)
+
     def whole(self, message: Message, field: str, wall: WallNs) -> int:
         """A clock in a message, of which 32 bits came, as a whole count."""
         return nearest(message.number(field), self.clock.tick_at(wall))

@@ -93,7 +93,10 @@ class DigitalOut:
                 return
             self._given.append(change)
         if self._hungry(wall):
-            self._give(soonest, self.level, soonest, wall)
+            tick = core.unhurried(wall)
+            if self._pending and self._pending[0].tick <= tick:
+                tick = soonest  # a change is due before
+            self._give(tick, self.level, soonest, wall)
 
     def _correct(self, level: bool, soonest: int, wall: WallNs) -> None:
         """Behind a rewind: what is set for ticks that are given away already cannot come then."""

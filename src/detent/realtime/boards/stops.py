@@ -115,7 +115,7 @@ class Stop:
             return
         self._quieting = 0
         if not self._alive:
-            report = core.soonest(wall)
+            report = core.unhurried(wall)
             core.command("trsync_start", oid=self.oid, report_clock=report & MASK, report_ticks=core.ticks(REPORT),
                          expire_reason=0)  # fmt: skip
             for oid in self._axis.oids:
