@@ -5,6 +5,7 @@ from random import Random
 import pytest
 from tests.realtime.boards.driven_bench import Bench, pulses
 
+from detent.realtime.boards.events import DriverFault
 from detent.realtime.boards.states import Standing, Weight
 from detent.ticks import MS, SECOND, US, Ns
 
@@ -461,3 +462,51 @@ def test_a_plain_driver_gets_half_of_its_current_at_rest() -> None:
         edges = [bench.boards.boards["b"].core.scale.time(tick) for tick, _ in bench.edges("x")]
         assert full < edges[0]
         assert half > edges[-1]
+
+
+def test_a_driver_that_fails_in_mid_move_stops_its_axis() -> None:
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.driven.axles[0].what = bench.driven.axles[0].what._replace(driver="x.driver")
+        bench.type("x", "g-")
+        bench.run(500 * MS)
+        before = bench.position("x")
+        bench.boards.master.core.events.append(DriverFault("b", "x.driver", "it is too hot"))
+        bench.run(1 * SECOND)
+        after = bench.position("x")
+        assert before - 1000 * (LEAD + 5 * MS) // SECOND <= after <= before
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.FAULT
+        assert state.shaft == after
+        assert "too hot" in state.why
+
+
+def test_an_input_that_gates_single_pulses_is_refused_when_it_shows() -> None:
+    with Bench(CELL, switches={"x.ENABLE": ("x", 0, 10**6)}) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+50")
+        for _ in range(40):  # a detector outside: high for one pulse at a time
+            bench.run(60 * MS)
+            bench.press("x.ENABLE", 1)
+            bench.run(1 * MS)
+        bench.rest()
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.FAULT
+        assert "x.ENABLE lets every single pulse through" in state.why
+        assert state.shaft == bench.position("x") < 50
+
+
+def test_a_stop_longer_ago_than_is_kept_is_a_fault_where_the_motor_stands() -> None:
+    with Bench(DCB, switches={"x.LIMIT-A": ("x", 200, 10**6)}) as bench:
+        bench.run(100 * MS)
+        bench.type("x", " ")
+        bench.run(200 * MS)
+        bench.type("x", "M 2000")
+        while bench.position("x") < 195:
+            bench.run(1 * MS)
+        bench.driven.past.clear()
+        bench.run(500 * MS)
+        bench.rest()
+        state = bench.driven.axes()[0]
+        assert bench.position("x") == 200 == state.shaft
+        assert max(place for _, place in bench.edges("x")) == 200

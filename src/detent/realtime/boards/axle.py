@@ -21,6 +21,8 @@ class Axle:
         self.motions: Channel[Motion] = Channel()
         self.standing, self.why, self.known = Standing.WAITING, "", True
         self.stops = 0
+        self.held: tuple[str, int] | None = None  # which input stopped it last, and where
+        self.singles = 0  # so many times in a row a single pulse after the last time
         self.rested: Ns | None = 0  # since when it is at rest; None while it moves
         self._shaft = shaft  # at rest
 
@@ -60,6 +62,25 @@ class Axle:
         if motion is None:
             return self._shaft
         return motion.shaft + motion.direction * _given(motion, now)
+
+    def place_at(self, at: Ns) -> int | None:
+        """Where the cell had the shaft at `at`; None: longer ago than is kept."""
+        told = self.motions.before(self.motions.count)
+        place = next((n for n in range(len(told) - 1, -1, -1) if told[n].at <= at), None)
+        if place is None:
+            return None if told else self._shaft
+        entry = told[place]
+        if isinstance(entry, MotionStarted):
+            return entry.shaft + entry.direction * _given(entry, at)
+        before = told[place - 1] if place else None
+        if isinstance(before, MotionStarted):
+            return before.shaft + before.direction * entry.last
+        return self._shaft if place == len(told) - 1 else None
+
+    def end_told(self, now: Ns, told: list[Motion]) -> None:
+        """The motion that the stepper was told of last, in `told`, ends with what it has given."""
+        if told and isinstance(told[-1], MotionStarted):
+            self.stepper.tell(MotionCut(now, _given(told[-1], now), self.what.axis))
 
     def displace(self, by: int) -> None:
         """The shaft, at rest, is elsewhere."""

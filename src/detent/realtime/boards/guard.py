@@ -50,6 +50,10 @@ class Guard:
             else:
                 self._stop.disarm()
 
+    def later(self, by: Ns) -> None:
+        """Pulses come so much later: what watches their last ones watches longer."""
+        self._tails = {name: tail._replace(until=tail.until + by) for name, tail in self._tails.items()}
+
     def fired(self) -> None:
         """The stop has fired: nothing is armed any more."""
         self.wanted, self._tails, self.armed = {}, {}, {}

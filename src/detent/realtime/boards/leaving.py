@@ -283,14 +283,7 @@ class Leaving:
         for axle in self.axles:
             if axle.standing is not Standing.DRIVEN:
                 continue
-            motion = axle.motion
-            inputs: dict[str, Level] = {}
-            if motion is not None:
-                controller = self.cell.controller(axle.what.unit)
-                for stop in controller.cuts(now, axle.what.axis):
-                    name = self._input_of.get((axle.what.unit, stop.pin))
-                    if name is not None and self.plan.board_of[name] == axle.what.board:
-                        inputs[name] = stop.level
+            motion, inputs = axle.motion, self._cuts(axle)
             if inputs != axle.guard.wanted:
                 at = motion.at if motion is not None and not axle.guard.armed else now
                 axle.guard.want(inputs, at, self.plan.lead + axle.stepper.lag)
@@ -300,6 +293,16 @@ class Leaving:
                     kept = True
         if not kept and self._guarded and (not self.past.moments or now - self.past.moments[-1].now >= KEEP):
             self.past.keep()
+
+    def _cuts(self, axle: Axle) -> dict[str, Level]:
+        """The inputs of its board that would cut what an axis does now."""
+        inputs: dict[str, Level] = {}
+        if axle.motion is not None:
+            for stop in self.cell.controller(axle.what.unit).cuts(self.cell.now, axle.what.axis):
+                name = self._input_of.get((axle.what.unit, stop.pin))
+                if name is not None and self.plan.board_of[name] == axle.what.board:
+                    inputs[name] = stop.level
+        return inputs
 
     def _refresh(self) -> None:
         for axle in self.axles:

@@ -39,6 +39,7 @@ class Mishaps(TakingBack):
                     self._place(axle, event.shaft)
             case Slipped(_, stepper, at, by):
                 self._later(self._by_stepper[stepper], at)
+                self._by_stepper[stepper].guard.later(by)
                 slips = self._by_stepper[stepper].stepper.slips
                 what = f"{stepper} slipped by {show_duration(by)}: the computer was late; no step is lost"
                 self._say(Weight.WARNING, f"{what} ({slips} {'slip' if slips == 1 else 'slips'} so far)")
@@ -85,10 +86,10 @@ class Mishaps(TakingBack):
     def _fault(self, axle: Axle, why: str, *, known: bool = True) -> None:
         """An axis does not move any more: its unit is halted, and told so whenever it tries."""
         first = axle.standing is not Standing.FAULT
+        self.cell.halt(axle.what.unit)
+        self._absorb()  # the stepper is told, while it still is
         axle.standing, axle.why, axle.known = Standing.FAULT, why, known
         axle.guard.release()
-        self.cell.halt(axle.what.unit)
-        self._absorb()
         self.past.clear()
         if first:
             self._say(Weight.FAULT, f"{axle.name} stands: {why}; look at the machine, then recover")

@@ -62,11 +62,13 @@ class Past:
         deeds: Sequence[Deed],
         drop: Callable[[Action], bool],
         arrived: Callable[[Moment], None],
+        lived: Callable[[], None],
     ) -> None:
         """The cell is as it was at `at`; `deeds` are done there, and then it lives on to its present.
 
         What was done to it later is done again, but what is to `drop`. `arrived` is called at `at`, before the deeds,
-        with the moment from which it was run. IndexError where no moment is kept that is old enough.
+        with the moment from which it was run, `lived` behind each eventful instant from there on. IndexError where no
+        moment is kept that is old enough.
         """
         cell, present = self.cell, self.cell.now
         base = [moment for moment in self.moments if moment.now <= at][-1]
@@ -79,11 +81,18 @@ class Past:
         cell.run_to(at)
         arrived(base)
         self.moments = [moment for moment in self.moments if moment.now <= at]
-        for deed in deeds:
-            perform(cell, Action(at, deed))
-        for action in later:
+        for action in (*(Action(at, deed) for deed in deeds), *later):
+            _live(cell, action.at, lived)
             perform(cell, action)
-        cell.run_to(present)
+            lived()
+        _live(cell, present, lived)
+
+
+def _live(cell: Cell, until: Ns, lived: Callable[[], None]) -> None:
+    while (at := cell.next_event()) is not None and at <= until:
+        cell.run_to(at)
+        lived()
+    cell.run_to(until)
 
 
 def perform(cell: Cell, action: Action) -> None:

@@ -8,7 +8,7 @@ from detent.cell.deeds import Action, Deed, SetPin
 from detent.cell.recording import Batch
 from detent.controllers.device import Powered
 from detent.lines.line import Heard
-from detent.pins import PinSet
+from detent.pins import Level, PinSet
 from detent.realtime.boards.axle import Axle, Motion
 from detent.realtime.boards.channels import alike
 from detent.realtime.boards.events import (
@@ -18,6 +18,8 @@ from detent.realtime.boards.leaving import Leaving, Out
 from detent.realtime.boards.past import Moment
 from detent.realtime.boards.states import Standing, Weight
 from detent.ticks import Ns
+
+MOST_SINGLES = 8  # pulses in a row that an input stops one by one
 
 
 class TakingBack(Leaving):
@@ -31,10 +33,18 @@ class TakingBack(Leaving):
         axle.stops += 1
         self.rewinds += 1
         unit, pin = self.plan.inputs[event.input]
-        at = axle.instant_of(event.shaft, event.at)
-        if not self.past.reaches(at):
-            at = self.past.moments[0].now if self.past.moments else self.cell.now
-        at = min(at, self.cell.now)
+        at = min(axle.instant_of(event.shaft, event.at), self.cell.now)
+        if self.past.moments:
+            at = max(at, self.past.moments[0].now)
+        if not self.past.reaches(at) or axle.place_at(at) != event.shaft:
+            self._fault(axle, f"{event.input} has stopped it at {event.shaft}, and nobody knows when that was")
+            self._place(axle, event.shaft)
+            return
+        if self._gates(axle, event):
+            what = f"{event.input} lets every single pulse through, and on real pins each takes some milliseconds"
+            self._fault(axle, f"{what}: leave the input out, and wire the detector to the driver")
+            self._place(axle, event.shaft)
+            return
         # what the machine's other inputs are at was so at the stop already: motors stand, and reports take their time
         others = {name: int(found) for name, found in event.levels.items() if name != event.input}
         late = {self.plan.inputs[name] for name in others}
@@ -56,6 +66,14 @@ class TakingBack(Leaving):
         self._arm()
         self.commit()
         self.longest_rewind = max(self.longest_rewind, self._wall() - began)
+
+    def _gates(self, axle: Axle, event: Stopped) -> bool:
+        """Whether an input has stopped every single pulse of late."""
+        last = axle.held
+        alone = last is not None and last[0] == event.input and abs(event.shaft - last[1]) == 1
+        axle.held = event.input, event.shaft
+        axle.singles = axle.singles + 1 if alone else 0
+        return axle.singles >= MOST_SINGLES
 
     def _take_back(
         self, stopped: Axle, at: Ns, deeds: Sequence[Deed], drop: Callable[[Action], bool], shaft: int
@@ -94,8 +112,14 @@ class TakingBack(Leaving):
                 place += 1
             self._stores.cut()
 
+        met: dict[str, Level] = {}
+
+        def lived() -> None:
+            self._take(self._batches(), tell=False)
+            met.update(self._cuts(stopped))
+
         self._stores.count = [m for m in self.past.moments if m.now <= at][-1].counts[-1]
-        self.past.back(at, deeds, drop, arrived)
+        self.past.back(at, deeds, drop, arrived, lived)
         self._take(self._batches(), tell=False)
         heard: list[list[Heard]] = [self.cell.lines[number].take() for number in range(len(self.lines))]
         for line, count, new in zip(self.lines, counts[len(self.axles) :], heard, strict=True):
@@ -105,7 +129,9 @@ class TakingBack(Leaving):
                 what = f"a host heard {wrong.char.value:#04x} of {wrong.at / 1e9:.4f} s before a stop took it back"
                 self._say(Weight.WARNING, what + instead)
         self._tell_axles(stopped, shaft, motions, counts)
-        self._arm()  # before any pulse leaves
+        if stopped.standing is Standing.DRIVEN:  # before any pulse leaves; those that came and went meanwhile, too
+            stopped.guard.want(met, at, self.plan.lead + stopped.stepper.lag)
+        self._arm()
         self.commit()
         for out in self._outs.values():
             self._tell_out(out, levels[out.name], out.levels.since(places[out.name]), at, stopped)
@@ -134,6 +160,7 @@ class TakingBack(Leaving):
             if axle is not stopped:
                 lost = axle.tell_difference(old[axle.name], new, now)
                 if lost:
+                    axle.end_told(now, old[axle.name])
                     self._contradicted(axle, stopped, lost)
                 continue
             axle.stepper.rewind(shaft)
