@@ -13,15 +13,22 @@ import numpy as np
 
 from bench.rows import Row, print_table
 from detent.axis import MotionStarted
+from detent.cell.build import build
+from detent.cell.delivery import no_store
+from detent.cell.description import parse
 from detent.outputs.steps import Error, Runs, Scale
 from detent.pulses import Accelerating, Train
 from detent.ramps import constant_acceleration, tick_accumulator
+from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.frames import Reader, block
 from detent.realtime.boards.link import Link
+from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.setup import BoardSetup, Pin, StepperSetup
 from detent.realtime.boards.several import Boards
+from detent.realtime.pace import Pace
 from detent.ticks import MS, SECOND, US, to_fixed
 
 CLOCK = 12_000_000
@@ -29,7 +36,7 @@ MILLION = 1e6
 
 
 def rows() -> list[Row]:
-    return [*compression_rows(), *link_rows(), *drive_rows()]
+    return [*compression_rows(), *link_rows(), *drive_rows(), *stop_rows()]
 
 
 def _ramps(rate: int) -> Train:
@@ -156,6 +163,56 @@ def drive_rows() -> list[Row]:
             found.append(Row("a commit at 10 kHz, half of them", often, "ms", "at rest", rest, 0.2))
             found.append(Row("a commit at 10 kHz, 99 % of them", rare, "ms", "at rest", rest, None))
     return found
+
+
+def stop_rows() -> list[Row]:
+    """How long it takes to take a homing cell back to a stop in the firmware; the baseline is a copy of the cell."""
+    text = """
+[units.x]
+model = "gs-c200"
+[boards.b]
+serial = "fake:"
+[hardware.x]
+board = "b"
+step = "gpio2"
+dir = "gpio3"
+inputs = { EOT = "^gpio10", HOME = "^gpio11" }
+"""
+    taken: list[float] = []
+    copies: list[float] = []
+    for end in range(20, 40):
+        machine = Machine({"x": MachineAxis("gpio2", "gpio3")}, [
+            MachineSwitch("x", "gpio10", end, 10_000, False), MachineSwitch("x", "gpio11", -10_000, end - 10, False),
+        ])  # fmt: skip
+        port, now = FakePort(FakeBoard(machine, moves=400)), [SECOND]
+
+        def sleep(_: object, __: object, seconds: float, now: list[int] = now) -> tuple[list[int], list[int]]:
+            now[0] += max(round(seconds * SECOND), 10 * US)
+            return [], []
+
+        real = RealPins(lambda news: None, lambda address, port=port: port, lambda now=now: now[0], sleep)  # type: ignore[misc]
+        opened = Opened(parse(text, "cell.toml"), str, real)
+        stores = HeldStores(no_store)
+        cell = build(parse(text, "cell.toml"), str, store=stores.save, line_timing=False, inputs=opened.inputs)
+        driven = opened.drive(cell, stores)
+        opened.begin(driven, Pace(clock=driven.clock))
+        driven.send(0, cell.talker("x").frame("H+"))
+        while driven.rewinds < 2:
+            now[0] += 500 * US
+            driven.run_to(driven.boards.cell_at(now[0]))
+            before, begin = driven.rewinds, process_time()
+            driven.serve()
+            if driven.rewinds > before:
+                taken.append(process_time() - begin)
+                begin = process_time()
+                cell.copy()
+                copies.append(process_time() - begin)
+    base, name = median(copies) / MS * SECOND, "a copy of the cell"
+    worst = max(taken) / MS * SECOND
+    return [
+        Row("a stop takes the cell back, half of them", median(taken) / MS * SECOND, "ms", name, base, 6),
+        Row("a stop takes the cell back, the longest", worst, "ms", name, base, None),
+    ]
 
 
 if __name__ == "__main__":
