@@ -5,11 +5,12 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
     from cyclopts import App
 
+TITLE = "Intelligent stepper motor controllers in software, exact to the pulse."
 FAILED = 1
 ASKED_WRONGLY = 2
 
@@ -50,7 +51,7 @@ def application(asked: str = "") -> "App":
 
     app = App(
         name="detent",
-        help="Intelligent stepper motor controllers in software, exact to the pulse.",
+        help=TITLE,
         version=detent.__version__,
         default_parameter=Parameter(negative=(), show_default=False),
         exit_on_error=False,
@@ -66,12 +67,20 @@ def application(asked: str = "") -> "App":
 
 def main(tokens: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0, 1 (it failed), 2 (it was asked wrongly)."""
-    from cyclopts import CycloptsError
-
-    from detent.cli import plain
-    from detent.extras import MissingExtra
+    from detent.cli import overview, plain
 
     given = list(sys.argv[1:] if tokens is None else tokens)
+    if overview.wanted(given):
+        try:
+            overview.show(TITLE, [(name, line) for name, (_, line) in VERBS.items()])
+        except BrokenPipeError:
+            _nobody_reads()
+        sys.exit(0)
+
+    from cyclopts import CycloptsError
+
+    from detent.extras import MissingExtra
+
     plain.make_safe()
     before = _hear_termination()
     try:
@@ -81,14 +90,19 @@ def main(tokens: Sequence[str] | None = None) -> None:
     except MissingExtra as error:
         print(f"detent: {error}", file=sys.stderr)
         sys.exit(ASKED_WRONGLY)
-    except BrokenPipeError:  # whoever read what is printed has had enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(FAILED)
+    except BrokenPipeError:
+        _nobody_reads()
     except KeyboardInterrupt:
         sys.exit(130)
     finally:
         if before is not None:
             signal.signal(signal.SIGTERM, before)
+
+
+def _nobody_reads() -> NoReturn:
+    """Whoever read what is printed has had enough."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(FAILED)
 
 
 def _hear_termination() -> Any:
