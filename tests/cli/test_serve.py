@@ -203,3 +203,42 @@ def test_several_lines_do_not_share_one_wire(
         main(["serve", str(cell), "--serial", "/dev/ttyS0"])
     assert exited.value.code == 2
     assert "one wire and the cell has several lines" in capsys.readouterr().err
+
+
+REAL = """
+[units.x]
+model = "gs-c200"
+straps = { CHS = "low" }
+[boards.b]
+serial = "fake:"
+[hardware.x]
+board = "b"
+step = "!gpio2"
+dir = "gpio3"
+inputs = { EOT = "^gpio10", HOME = "^gpio11" }
+"""
+
+
+def test_a_cell_with_real_pins_is_served_behind_its_board(tmp_path: Path) -> None:
+    cell = tmp_path / "cell.toml"
+    cell.write_text(REAL)
+    served = start(cell, "--real", "--realtime", "--json", "--state", tmp_path)
+    told = facts(served)
+    assert told["axes"] == ["x"]
+    assert told["boards"][0]["board"] == "b"
+    assert told["boards"][0]["state"] == "ready"
+    assert ask(told["endpoints"][0]["address"], b"+5\r") == b"Y\r"
+    end(served)
+
+
+def test_real_pins_need_their_tables_and_real_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cell = tmp_path / "cell.toml"
+    cell.write_text(TWO_LINES)
+    for choices, error in (
+        ([cell, "--real"], "hardware: no pin of this cell is real: add [boards.NAME] and [hardware.UNIT]"),
+        (["gs-c200", "--real", "--pace", "2"], "--pace: real pins keep real time: leave it out with --real"),
+    ):
+        with pytest.raises(SystemExit) as ended:
+            main(["serve", *map(str, choices), "--state", str(tmp_path)])
+        assert ended.value.code == 2
+        assert error in capsys.readouterr().err

@@ -7,6 +7,7 @@ whole count.
 """
 
 from collections import deque
+from math import ceil
 from typing import NamedTuple
 
 from detent.realtime.pace import WallNs
@@ -86,8 +87,9 @@ class Clock:
 
     def wall_at_ns(self, ns: Ns) -> WallNs:
         """The first wall time at which `ns_at` is `ns` or more, as far as is known now."""
-        wall = self.wall_at(-(-ns * self.frequency // SECOND))
-        while self.tick_at(wall) * SECOND // self.frequency < ns:
+        tick = -(-ns * self.frequency // SECOND)
+        wall = self._wall + ceil(((tick - self._whole) - self._tick) / self._rate)
+        while self.tick_at(wall) < tick:  # a float was rounded
             wall += 1
         return wall
 

@@ -93,8 +93,9 @@ class Driven(Mishaps):
         self._absorb()
         self._refresh()
         self._currents()
-        wanted = self.boards.commit_at()
-        if (self._pending and wall - self._committed >= COMMIT_EVERY) or (wanted is not None and wanted <= wall):
+        if wall - self._committed >= COMMIT_EVERY and (
+            self._pending or ((wanted := self.boards.commit_at()) is not None and wanted <= wall)
+        ):
             self.commit()
             for event in self.boards.events():
                 self._happened(event)
