@@ -9,7 +9,7 @@ from tests.controllers.laws.adapter import Limit, Redefinition, Stop
 from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
 
 from detent.controllers.dcb274.firmware import Dcb274
-from detent.pins import HIGH, LOW
+from detent.pins import HIGH, LOW, Level
 from detent.ticks import MS, SECOND, US, Ns
 
 KEYS = ("JOG1", "JOG2", "JOG-S", "GO")  # levels that are looked at in the idle state (page 27)
@@ -42,6 +42,11 @@ def registers(bench: Bench) -> tuple[int, int, int, int, int]:
 def flags(bench: Bench) -> int:
     """The options of `l`, as the last line that set them has it."""
     return int(bench.device._settings.flags)  # type: ignore[attr-defined]
+
+
+def active(bench: Bench) -> Level:
+    """The level at which a limit stops: with flag 1 "both inputs must be held low to allow a move" (page 45)."""
+    return HIGH if flags(bench) & 1 else LOW
 
 
 def ramp(rate: float, steps: int, initial: int, divide: int) -> tuple[int, Ns]:
@@ -142,7 +147,7 @@ class Axis:
             case 5 | 6:
                 return [Say(draw.choice(SETTINGS))]
             case 7:
-                return [Say(draw.choice(("@", "M 0", "W 0", "W 30", "l 32", "l 0")))]
+                return [Say(draw.choice(("@", "M 0", "W 0", "W 30", "l 32", "l 0", "l 0", "l 1")))]
             case 8 | 9:
                 lines = draw.choice(PROGRAMS)
                 stored = [deed for line in lines for deed in (Say(line), Wait(20 * MS))]
@@ -279,8 +284,8 @@ class Axis:
             return ramp(rate, down, initial, divide)[0] + 2 if flags(bench) & GENTLE else 0
 
         return (
-            Limit("LIMIT-A", "", 1, lambda bench: bench.level("LIMIT-A") == LOW, steps),
-            Limit("LIMIT-B", "", -1, lambda bench: bench.level("LIMIT-B") == LOW, steps),
+            Limit("LIMIT-A", "", 1, lambda bench: bench.level("LIMIT-A") == active(bench), steps),
+            Limit("LIMIT-B", "", -1, lambda bench: bench.level("LIMIT-B") == active(bench), steps),
         )
 
 
@@ -316,7 +321,7 @@ def alone(bench: Bench) -> bool:
     """Whether the axis moves, nothing is pending, and the limit ahead is open."""
     motion = bench.device._motion  # type: ignore[attr-defined]
     free = not busy(bench) and motion._reversed is None
-    return bool(bench.moving) and free and bench.level(ahead(bench)) == HIGH
+    return bool(bench.moving) and free and bench.level(ahead(bench)) == HIGH and active(bench) == LOW
 
 
 def ahead(bench: Bench) -> str:

@@ -8,7 +8,7 @@ from tests.controllers.laws.adapter import Limit, Redefinition, Stop
 from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
 
 from detent.controllers.genstepper.firmware import GenStepper
-from detent.pins import HIGH, LOW
+from detent.pins import HIGH, LOW, Level
 from detent.ticks import MS, SECOND, US, Ns
 
 TICK = 16 * US  # "62 500 microsteps/second": one look at the speed (page 20)
@@ -102,13 +102,15 @@ class Board:
         return self._rare(draw)
 
     def _rare(self, draw: Random) -> Sequence[Deed]:
-        match draw.randrange(5):
+        match draw.randrange(7):
             case 0:
                 return [Power(False), Wait(1 * MS), Power(True), *self.ready()]
             case 1:
                 return [Say("1E"), Wait(1 * MS), Put("X+", LOW), Wait(1 * MS), Put("X+", HIGH), Say("0E")]
             case 2:
                 return [Say("4!"), *self.ready()]
+            case 5:  # limits blocked, or active when high (page 34)
+                return [Say(draw.choice(("15T", "0T", "240T", "0T")))]
         return [Raw(draw.randbytes(draw.randrange(5)), draw.randrange(-1, 3))]
 
     def meanwhile(self, draw: Random) -> Sequence[Deed]:
@@ -135,6 +137,8 @@ class Board:
         )  # fmt: skip
 
     def _limit_opens(self, bench: Bench) -> bool:
+        if mask(bench) != (False, LOW):
+            return False
         return all(bench.level(ahead(bench, axis)) == HIGH for axis in bench.moving) and bool(bench.moving)
 
     def meets(self, phase: str, stop: Stop) -> bool:
@@ -188,6 +192,12 @@ class Board:
             return bench.level(pin) == (HIGH if inverted else LOW) and not ignored and not blocked
 
         return Limit(pin, axis, direction, closed, steps)
+
+
+def mask(bench: Bench) -> tuple[bool, Level]:
+    """What the last T made of the limits: whether they are blocked, and at which level they are active (page 34)."""
+    bits = bench.device._limits._mask  # type: ignore[attr-defined]
+    return bool(bits & 15), HIGH if bits & 240 else LOW
 
 
 def hears(bench: Bench) -> bool:
