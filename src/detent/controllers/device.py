@@ -237,8 +237,8 @@ class Controller(Device, Protocol):
     def cuts(self, now: Ns, axis: str = "") -> Sequence[Stop]:
         """The inputs that, changed at `now`, cut the motion of an axis, or hold its next pulse back.
 
-        What slows down first is none of them; nor is anything at rest, or while the pulse is held already. What holds
-        at `now` holds until something happens to the controller, by itself or from outside.
+        What slows down first is none of them; nor is anything at rest, or while the pulse is held already. On a ramp
+        it may be otherwise a moment later: what stops without a ramp at low speed needs one at a higher.
         """
 
     def switches(self, axis: str = "") -> Sequence[str]:

@@ -88,17 +88,26 @@ class Driven(Mishaps):
         if self.abandoned:
             self.boards.events()
             return
-        for event in self.boards.events():
+        events = self.boards.events()
+        for event in events:
             self._happened(event)
         self._absorb()
-        self._refresh()
-        self._currents()
+        tail = min((axle.guard.next for axle in self.axles), default=NEVER)
+        over = tail <= self.cell.now or self._stores.first <= self._horizon()
+        if events or over or wall - self._looked >= COMMIT_EVERY:
+            self._looked = wall
+            self._look()
         if wall - self._committed >= COMMIT_EVERY and (
             self._pending or ((wanted := self.boards.commit_at()) is not None and wanted <= wall)
         ):
             self.commit()
             for event in self.boards.events():
                 self._happened(event)
+
+    def _look(self) -> None:
+        """What is over by now, and what is certain; and whether all is as it should be."""
+        self._refresh()
+        self._currents()
         self._prove()
         self._stores.flush(self._horizon())
         self._forget()

@@ -84,6 +84,7 @@ class Leaving:
         self.lines = [HeldLine(cell, number, self._horizon) for number in range(len(cell.lines))]
         self.past = Past(cell, self._counts)
         self._committed: WallNs = 0
+        self._looked: WallNs = 0
         self._pending = True  # something was told that no commit has followed
         self._stages: dict[str, Stage] = {}
         self._halved: dict[str, bool] = {}  # whether a plain driver is told to give half of its current

@@ -18,7 +18,7 @@ from detent.realtime.boards.events import (
 from detent.realtime.boards.setup import SetupProblem
 from detent.realtime.boards.states import Standing, Weight
 from detent.realtime.boards.taking_back import TakingBack
-from detent.ticks import Ns, show_duration
+from detent.ticks import NEVER, Ns, show_duration
 
 
 class Mishaps(TakingBack):
@@ -112,6 +112,7 @@ class Mishaps(TakingBack):
     def abandon(self, why: str) -> None:
         """The cell cannot go on: every board stops at once, for good."""
         self.boards.emergency_stop(self._wall())
+        self._stores.flush(NEVER)
         for axle in self.axles:
             axle.standing, axle.why, axle.known = Standing.FAULT, why, False
             axle.guard.release()
