@@ -75,6 +75,13 @@ def soft(bench: Bench) -> Ns:
     """Down the ramp from the rate that the axis has when the character has been taken; the pulse on its way before."""
     travel = bench.travels[""]
     _, down, initial, _, divide = registers(bench)
+    match next((deed.text.split() for deed in reversed(bench.deeds) if isinstance(deed, Say)), []):
+        case ["I", value]:  # it may be in hand still
+            initial = min(initial, int(value))
+        case ["K", _, value]:
+            down = max(down, int(value))
+        case ["D", value]:
+            divide = max(divide, int(value))
     rate = max(travel.rate(bench.now), travel.rate(bench.now + EXECUTION), initial / divide)
     first = max(travel.interval(bench.now), int(2 * SECOND * divide / initial))
     return EXECUTION + first + ramp(rate, down, initial, divide)[1]

@@ -118,7 +118,9 @@ class Board:
 
     def phase(self, bench: Bench, axis: str) -> str:
         told = bench.device._motors[axis].step_action(bench.now)  # type: ignore[attr-defined]  # what -8? reports
-        return REPORTS[told] if told < 8 else "idle"  # 8: a limit was seen on this tick
+        return (
+            REPORTS[told] if told < 8 else "quick stop" if bench.travels[axis].moving else "idle"
+        )  # 8: a limit is seen
 
     def let_go(self, bench: Bench) -> Sequence[Deed]:
         return [Put(key, HIGH) for key in KEYS if bench.level(key) == LOW]
