@@ -1,0 +1,71 @@
+"""Whatever a host does, and however late the computer is: no axis passes its limits, and counts agree at rest."""
+
+from random import Random
+
+import pytest
+from tests.realtime.boards.driven_bench import Bench
+
+from detent.realtime.boards.states import Standing, Weight
+from detent.ticks import MS, US
+
+CELL = """
+[units.x]
+model = "dcb-274"
+[boards.b]
+serial = "fake"
+lead = "{lead} ms"
+[hardware.x]
+board = "b"
+step = "gpio2"
+dir = "gpio3"
+inputs = {{ LIMIT-A = "^gpio10", LIMIT-B = "^gpio11", HOME = "^gpio12", JOG1 = "^gpio13", JOG2 = "^gpio14" }}
+"""
+LINES = ["+{n}", "-{n}", "M {r}", "M -{r}", "M 0", "F {r} 0", "F {r} 1", "@", "\x1b", "Z 0", "R {n}", "R -{n}", "|"]
+
+
+def run(seed: int) -> int:
+    """One random session; how many stops there were."""
+    random = Random(seed)
+    edge = random.randrange(30, 300)
+    switches = {
+        "x.LIMIT-A": ("x", edge, 10**6), "x.LIMIT-B": ("x", -(10**6), -edge), "x.HOME": ("x", -20, -10),
+    }  # fmt: skip
+    text = CELL.format(lead=random.choice([5, 10, 30, 60]))
+    with Bench(text, switches=switches, jitter=lambda: random.randrange(400 * US)) as bench:
+        bench.run(100 * MS)
+        bench.type("x", " ")
+        bench.run(200 * MS)
+        for _ in range(random.randrange(3, 15)):
+            line = random.choice(LINES).format(n=random.randrange(1, 2 * edge), r=random.randrange(200, 4000))
+            if len(line) == 1:
+                bench.send("x", line.encode())
+            else:
+                bench.type("x", line)
+            bench.run(random.choice([1 * MS, 8 * MS, 40 * MS, 200 * MS, 900 * MS]) + random.randrange(MS))
+            if random.random() < 0.15:
+                bench.stall(random.randrange(5 * MS, 120 * MS))
+            if random.random() < 0.2:
+                bench.press(random.choice(["x.JOG1", "x.JOG2"]), random.randrange(2))
+        bench.press("x.JOG1", 1)
+        bench.press("x.JOG2", 1)
+        bench.run(50 * MS)
+        bench.send("x", b"\x1b")
+        bench.rest()
+        places = [place for _, place in bench.edges("x")]
+        assert all(-edge <= place <= edge for place in places), f"{min(places)} to {max(places)} of {edge}"
+        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.DRIVEN
+        assert state.shaft == bench.position("x") == (places[-1] if places else 0)
+        assert bench.cell.controller("x").status(bench.cell.now).pulses == len(places)
+        assert bench.driven.escaped == 0
+        return state.stops
+
+
+def test_no_axis_passes_its_limits() -> None:
+    assert sum(run(seed) for seed in range(10)) > 10
+
+
+@pytest.mark.slow
+def test_no_axis_passes_its_limits_in_many_sessions() -> None:
+    assert sum(run(seed) for seed in range(100, 400)) > 300
