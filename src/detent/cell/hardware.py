@@ -85,6 +85,7 @@ class Driver(_Table):
     half: OutPin | None = None  # plain: high while at most half of the current is wanted
     amperes: Annotated[Number, Field(gt=0)] | None = None  # of a phase, for full power; a controller may command them
     sense: Annotated[Number, Field(gt=0)] = 0.11  # ohm
+    microsteps: Literal[1, 2, 4, 8, 16, 32, 64] | None = None  # pulses a full step, of a controller that commands none
     uart: InPin | None = None
     transmit: OutPin | None = None
     address: Annotated[int, Field(ge=0, le=3)] = 0
@@ -99,6 +100,8 @@ class Driver(_Table):
     @model_validator(mode="after")
     def _fits(self) -> "Driver":
         if self.kind == "plain":
+            if self.microsteps is not None:
+                raise ValueError("a plain driver has its own switches for microsteps: leave microsteps out")
             if self.half is None:
                 raise ValueError("a plain driver needs half = 'PIN', the input that halves its current; or no table")
             return self

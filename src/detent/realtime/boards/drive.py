@@ -11,12 +11,13 @@ from detent.cell.cell import Cell
 from detent.cell.description import Description
 from detent.pins import Level
 from detent.realtime.boards.driven import Driven
-from detent.realtime.boards.opening import Sleep, boards_of, make_ready
+from detent.realtime.boards.opening import Sleep, boards_of, make_ready, set_drivers
 from detent.realtime.boards.plan import Plan, plan
 from detent.realtime.boards.port import Port
 from detent.realtime.boards.ports import open_port
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.several import Boards
+from detent.realtime.boards.stages import stages
 from detent.realtime.boards.states import News
 from detent.realtime.pace import Pace, WallNs
 
@@ -41,14 +42,27 @@ class Opened:
     def __init__(self, described: Description, read: Callable[[str], str], real: RealPins) -> None:
         """Open them. Raises Problem. Nothing moves, and no output but those with a level at rest changes."""
         self._real = real
-        trial = build(described, read, record=False)
+        trial = build(described, read)
         self.plan: Plan = plan(described, trial.controllers())
+        self.stages = stages(self.plan, trial)
+        """What the power stage of each stepper is told at first."""
         self.boards: Boards = boards_of(self.plan, real.open_port)
         try:
             self._levels: dict[str, Level] = make_ready(self.boards, self.plan, real.wall, real.sleep)
+            set_drivers(self.boards, self.plan, self.stages, real.wall, real.sleep)
         except BaseException:
             self.boards.close()
             raise
+
+    @property
+    def levels(self) -> Mapping[str, Level]:
+        """The levels of all real inputs when the boards were opened, by their names on the boards."""
+        return self._levels
+
+    @property
+    def real(self) -> RealPins:
+        """With what they were opened."""
+        return self._real
 
     @property
     def inputs(self) -> Mapping[tuple[str, str], Level]:

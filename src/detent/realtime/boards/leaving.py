@@ -102,6 +102,9 @@ class Leaving:
         for axle in self.axles:
             axle.stepper.adopt(axle.shaft_at(self.cell.now))
             axle.standing = Standing.DRIVEN
+            if axle.what.stage is not None:
+                self._stages[axle.name] = axle.what.stage
+                self._command(axle)
         for unit, pin in self._outs:
             self._level(unit, pin, False, self.cell.now)  # until the recording tells better
         self._absorb()

@@ -2,17 +2,18 @@
 
 import select
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from detent.cell.description import Problem
+from detent.controllers.device import Stage
 from detent.pins import Level
-from detent.realtime.boards.events import Ready, Refusal
+from detent.realtime.boards.events import DriverFault, DriverSet, Ready, Refusal
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.port import Port
 from detent.realtime.boards.setup import SetupProblem
 from detent.realtime.boards.several import Boards
 from detent.realtime.pace import WallNs
-from detent.ticks import MS, SECOND
+from detent.ticks import MS, SECOND, Ns
 
 PATIENCE: WallNs = 10 * SECOND
 
@@ -46,7 +47,6 @@ def make_ready(
 
     Raises Problem where a board refuses, or does not answer in time.
     """
-    sleep = sleep or _sleep
     levels: dict[str, Level] = {}
     began = wall()
     boards.start(began)
@@ -56,21 +56,55 @@ def make_ready(
             late = next(name for name, board in boards.boards.items() if board.state.value != "ready")
             what = f"the board does not answer as one with Klipper firmware would, for {PATIENCE // SECOND} s"
             raise Problem(plan.file, f"boards.{late}.serial", f"{what}: look with detent boards")
-        due = boards.deadline()
-        left = 20 * MS if due is None else min(max(due - now, 0), 20 * MS)
-        readable, writable = sleep(boards.reading(), boards.writing(), left / SECOND)
-        now = wall()
-        for descriptor in readable:
-            boards.receive(descriptor, now)
-        for descriptor in writable:
-            boards.flush(descriptor, now)
-        boards.due(now)
+        turn(boards, wall, sleep)
         for event in boards.events():
             if isinstance(event, Refusal):
                 raise plan.problem(SetupProblem(event.item or event.board, event.key, event.text))
             if isinstance(event, Ready):
                 levels |= {name: int(level) for name, level in event.inputs.items()}
     return levels
+
+
+def set_drivers(
+    boards: Boards,
+    plan: Plan,
+    stages: Mapping[str, Stage],
+    wall: Callable[[], WallNs] = time.monotonic_ns,
+    sleep: Sleep | None = None,
+) -> None:
+    """Give every driver chip its settings, and wait until each has taken them. Nothing moves. Raises Problem."""
+    waiting = {axis.driver for axis in plan.axes if axis.driver}
+    try:
+        for axis in plan.axes:
+            if axis.driver:
+                boards.drivers[axis.driver].command(stages[axis.stepper])
+    except SetupProblem as problem:
+        raise plan.problem(problem) from None
+    began = wall()
+    while waiting:
+        boards.commit(0, wall())
+        turn(boards, wall, sleep)
+        for event in boards.events():
+            if isinstance(event, DriverFault):
+                raise plan.problem(SetupProblem(event.driver, "", event.reason))
+            if isinstance(event, DriverSet):
+                waiting.discard(event.driver)
+        if waiting and wall() - began > PATIENCE:
+            raise plan.problem(SetupProblem(min(waiting), "", "the driver is not set after ten seconds; look at its "
+                                            "supply and its wires"))  # fmt: skip
+
+
+def turn(boards: Boards, wall: Callable[[], WallNs], sleep: Sleep | None, most: Ns = 20 * MS) -> None:
+    """Wait until something comes, is due, or `most` is over; and deal with it. Events are left to the caller."""
+    now, due = wall(), boards.deadline()
+    left = most if due is None else min(max(due - now, 0), most)
+    readable, writable = (sleep or _sleep)(boards.reading(), boards.writing(), left / SECOND)
+    now = wall()
+    for descriptor in readable:
+        boards.receive(descriptor, now)
+    for descriptor in writable:
+        boards.flush(descriptor, now)
+    boards.due(now)
 
 
 def _sleep(readers: Sequence[int], writers: Sequence[int], seconds: float) -> tuple[Sequence[int], Sequence[int]]:

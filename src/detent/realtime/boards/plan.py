@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 from detent.cell.description import Description, Problem
 from detent.cell.hardware import Board, Hardware
-from detent.controllers.device import Controller
+from detent.controllers.device import Controller, Stage
 from detent.pins import HIGH, PinKind
 from detent.realtime.boards.setup import BoardSetup, DriverSetup, InputSetup, OutSetup, Pin, SetupProblem, StepperSetup
 from detent.ticks import MS, US, Ns
 
 MOST_MARGIN: Ns = 4 * MS
 LEAST_PULSE: Ns = 2 * US
+CYCLE = 64  # places in a full step, of a `Stage`
 
 UnitPin = tuple[str, str]
 
@@ -30,6 +31,7 @@ class DrivenAxis(NamedTuple):
     enable: str = ""
     driver: str = ""
     half: str = ""
+    stage: Stage | None = None  # what its driver is told where the controller commands nothing
 
 
 class Plan(NamedTuple):
@@ -138,6 +140,8 @@ def _axis(
         keys[axis.half] = f"{where}.driver.half"
     elif driver is not None and driver.kind != "plain":
         axis = axis._replace(driver=f"{key}.driver")
+        if driver.microsteps is not None:
+            axis = axis._replace(stage=Stage(0, CYCLE // driver.microsteps))
         keys[axis.driver] = f"{where}.driver"
         pins = {k: Pin.parse(text) for k, text in driver.pins().items()}
         here.drivers.append(

@@ -5,12 +5,13 @@ import os
 import select
 import termios
 import tty
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from detent.realtime.boards.board import Board, State
 from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.chips import Chips
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.port import Port as Port
 from detent.realtime.boards.port import PortError as PortError
@@ -21,6 +22,15 @@ from detent.realtime.pace import WallNs
 BAUD = 250_000  # the firmware's own default; USB boards do not care
 MOST_READ = 4096
 FAKE = "fake:"
+FAKES: Mapping[str, Callable[[], FakeBoard]] = {
+    "": lambda: FakeBoard(moves=512),
+    "rp2040": lambda: FakeBoard(moves=512, frequency=12_000_000, pins={"gpio0": (0, 30)}, window=None, reserved={}),
+    "stm32": lambda: FakeBoard(
+        moves=512, frequency=64_000_000, window=None, reserved={"USB": "PA11,PA12"},
+        pins={f"P{port}0": (16 * number, 16) for number, port in enumerate("ABCDEFGH")},
+    ),
+}  # fmt: skip
+"""Fake boards by what follows `fake:`, with the names that the pins of such boards have."""
 BY_ID = Path("/dev/serial/by-id")
 
 
@@ -145,14 +155,17 @@ class SerialPort:
 def open_port(address: str) -> Port:
     """The port at `address`: a serial device (a by-id name is best), a pseudo-terminal, or `fake:`.
 
-    A fake board has 64 pins, gpio0 and gpio1 taken, and nothing connected. PortError with the remedy.
+    A fake board has 64 pins, gpio0 and gpio1 taken; `fake:rp2040` and `fake:stm32` have the pins of such boards.
+    Nothing is connected, but every driver chip that is asked for answers. PortError with the remedy.
     """
     if address.startswith(FAKE):
-        if address != FAKE:
-            raise PortError(f"{address}: a fake board has no settings; write {FAKE}")
-        board = FakeBoard(moves=512)
+        make = FAKES.get(address.removeprefix(FAKE))
+        if make is None:
+            raise PortError(f"{address}: there is no such fake board; there are {', '.join(FAKE + k for k in FAKES)}")
+        board = make()
         board.kept_log = False
-        return FakePort(board)
+        board.chips = Chips()
+        return FakePort(board, address=address)
     return SerialPort(address)
 
 

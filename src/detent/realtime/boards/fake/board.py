@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from functools import partial
 from heapq import heappop, heappush
+from types import MappingProxyType
 from typing import Any
 
 from detent.realtime.boards.dictionary import Dictionary, Format, Value
@@ -12,6 +13,7 @@ from detent.realtime.boards.fake.part import Shutdown
 from detent.realtime.boards.frames import FrameError, Reader, block, read_integer
 
 MASK = 0xFFFFFFFF
+TAKEN: Mapping[str, str] = MappingProxyType({"serial": "gpio0,gpio1"})
 LATENCY = 2000  # ticks between a command and its response on the wire
 
 
@@ -23,8 +25,9 @@ class FakeBoard:
 
     def __init__(
         self, machine: Machine | None = None, *, seed: int = 1, frequency: int = 16_000_000, moves: int = 64,
-        pins: int = 64, window: int | None = 192, first_tick: int = (1 << 32) - 50_000_000, sequence: int = 9,
-        leave_out: tuple[str, ...] = (), reset: str = "reset", version: str = "fake-1",
+        pins: int | Mapping[str, tuple[int, int]] = 64, window: int | None = 192,
+        first_tick: int = (1 << 32) - 50_000_000, sequence: int = 9, leave_out: tuple[str, ...] = (),
+        reset: str = "reset", version: str = "fake-1", reserved: Mapping[str, str] = TAKEN,
     ) -> None:  # fmt: skip
         self.machine = machine if machine is not None else Machine()
         self.frequency, self.moves_allowed, self.window = frequency, moves, window
@@ -33,7 +36,8 @@ class FakeBoard:
         self.log: list[tuple[int, str, Mapping[str, Value]]] = []  # commands that were carried out
         self.kept_log = True
         numbers = words.numbered(seed, leave_out=leave_out, reset=reset)
-        self.identity = words.dictionary(*numbers, frequency=frequency, pins=pins, window=window, version=version)
+        self.identity = words.dictionary(*numbers, frequency=frequency, pins=pins, window=window, version=version,
+                                         reserved=reserved)  # fmt: skip
         self.dictionary = Dictionary.of_bytes(self.identity)
         self._commands = {form.number: form for form in self.dictionary.commands.values()}
         self._responses = {form.name: form for form in (Format(text, n) for text, n in numbers[1].items())}

@@ -1,6 +1,7 @@
 """Driver chips on the fake board's wires: registers that are written and read back, and how they fail."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from detent.realtime.boards.fake.part import Home, Part, Shutdown
 from detent.realtime.boards.registers import bits_of_bytes, bytes_of_bits, check_byte
@@ -25,6 +26,14 @@ class Chip:
     def read(self, register: int) -> int:
         """What a register says."""
         return self.writes & 0xFF if register == IFCNT else self.registers.get(register, 0)
+
+
+class Chips(dict[object, Sequence[Chip]]):
+    """Every wire has its chips, of every address."""
+
+    def get(self, wire: object, default: Any = None) -> Any:
+        """The chips on a wire."""
+        return self.setdefault(wire, [Chip(address) for address in range(4)])
 
 
 class _Uart(Part):

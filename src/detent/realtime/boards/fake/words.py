@@ -90,17 +90,18 @@ def numbered(
 
 
 def dictionary(
-    commands: Mapping[str, int], responses: Mapping[str, int], *, frequency: int, pins: int, window: int | None,
-    version: str,
+    commands: Mapping[str, int], responses: Mapping[str, int], *, frequency: int,
+    pins: int | Mapping[str, tuple[int, int]], window: int | None, version: str, reserved: Mapping[str, str],
 ) -> bytes:  # fmt: skip
-    """What `identify` gives."""
-    config: dict[str, object] = {"CLOCK_FREQ": frequency, "MCU": "fake", "RESERVE_PINS_serial": "gpio0,gpio1"}
+    """What `identify` gives. `pins`: how many, or ranges: the name of the first, its number, and how many."""
+    config: dict[str, object] = {"CLOCK_FREQ": frequency, "MCU": "fake"}
+    config |= {f"RESERVE_PINS_{use}": names for use, names in reserved.items()}
     if window is not None:
         config["RECEIVE_WINDOW"] = window
     content = {
         "app": "Fake", "version": version, "commands": dict(commands), "responses": dict(responses), "config": config,
         "enumerations": {
-            "pin": {"gpio0": [0, pins]},
+            "pin": {"gpio0": [0, pins]} if isinstance(pins, int) else {name: [*span] for name, span in pins.items()},
             "spi_bus": {"spi0": [0, 2]},
             "static_string_id": {text: number + 2 for number, text in enumerate(REASONS)},
         },
