@@ -20,7 +20,7 @@ VERBS = {
     "workbench": ("detent.cli.workbench:workbench", "Show a controller or a cell in a browser, running in real time."),
     "serve": ("detent.cli.serve:serve", "Serve a controller or a cell in real time, until Ctrl-C."),
     "control": ("detent.cli.control:control", "Look at a cell that is served, meddle with it, break it."),
-    "boards": ("detent.cli.boards:boards", "Find boards with real pins; `boards check CELL.toml` proves the wiring."),
+    "boards": ("detent.cli.boards:boards", "Find boards with Klipper firmware; boards check CELL.toml proves the wiring."),
     "run": ("detent.cli.run:run", "Run a controller or a cell in virtual time and say where everything ended."),
     "asm": ("detent.cli.assemble:asm", "Assemble a program: labels and comments in, commands or an image out."),
     "list": ("detent.cli.assemble:list_", "List a program source with the address and bytes of every instruction."),

@@ -30,14 +30,14 @@ def boards(
     speed: int | None = None,
     json: bool = False,
 ) -> None:
-    """Find boards with Klipper firmware; `boards check CELL.toml` proves the wiring of a machine.
+    """Find boards with Klipper firmware; boards check CELL.toml proves the wiring.
 
     Without arguments every board in /dev/serial/by-id that calls itself Klipper is asked what it is; others only if
     they are named. It is left as it was.
 
     `detent boards check CELL.toml` moves nothing by itself: it shows every input live, until Enter. Then it asks, axis
-    by axis, whether to jog it by one revolution and back, slowly. Enter or Ctrl-C stops a jog at once; so does any input
-    of its unit that changes, in the board itself.
+    by axis, whether to jog it by one revolution and back, slowly. Enter or Ctrl-C stops a jog at once, and so
+    does any input of its unit that changes, in the board itself.
 
     Ends with 1 if nothing was found, or if a check found something wrong.
 

@@ -262,7 +262,7 @@ def test_ports_that_cannot_be_opened(tmp_path: Any) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(PortError, match="is no serial device"):
         open_port(str(tmp_path / "file"))
-    with pytest.raises(PortError, match="no settings"):
+    with pytest.raises(PortError, match="no such fake board"):
         open_port("fake:fast")
 
 

@@ -22,6 +22,7 @@ USUAL_STEPS = 200  # full steps of a revolution, where no motor is named
 USUAL_MICROSTEPS = 2  # a plain driver in half steps
 MOST_RATE = 2000  # steps/s: no ramp is driven
 WAKING: Ns = 300 * MS  # from enabling a driver to the first step
+ENDING: Ns = 60 * MS  # two reports of a stop
 PATIENCE: Ns = 3 * SECOND  # for the count, behind the last step
 
 
@@ -183,7 +184,8 @@ class Check:
         end = wall() + (steps * SECOND) // rate + self.plan.lead + PATIENCE
         met: list[Met] = []
         why = ""
-        while not why:
+        ending: Ns | None = None  # a stop on the last step is heard of later
+        while ending is None or wall() < ending:
             if aborted():
                 raise Trouble("stopped by hand; the boards are shut down, and their outputs off")
             for event in self._turn(5 * MS):
@@ -199,12 +201,12 @@ class Check:
                     raise Trouble(
                         f"{axis.stepper}: the board has counted {heard.counted} where {heard.shaft} were sent"
                     )
-            if stepper.over(wall()) and stepper.proof_due() is None:
-                break
+            over = stepper.over(wall()) and stepper.proof_due() is None and not boards.stops[axis.stepper].firing
+            if ending is None and over:
+                boards.stops[axis.stepper].disarm()
+                ending = wall() + ENDING
             if wall() > end:
                 raise Trouble(f"{axis.stepper}: its steps did not come in time")
-        boards.stops[axis.stepper].disarm()
-        self._pass(50 * MS)
         return Leg(direction, steps, abs(stepper.shaft - began), tuple(met), why)
 
     def end(self) -> None:
