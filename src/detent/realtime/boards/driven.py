@@ -74,7 +74,7 @@ class Driven(Mishaps):
         behind = self._behind  # what was said and stored before that is certain
         held = min((line.first for line in self.lines), default=NEVER)
         tail = min((axle.guard.next for axle in self.axles), default=NEVER)
-        cell = min(tail, min(held, self._stores.first) + behind)
+        cell = min(tail, held, self._stores.first) + behind
         if cell < NEVER:
             at = cell + self._align if at is None else min(at, cell + self._align)
         return at
@@ -92,8 +92,7 @@ class Driven(Mishaps):
         for event in events:
             self._happened(event)
         self._absorb()
-        tail = min((axle.guard.next for axle in self.axles), default=NEVER)
-        over = tail <= self.cell.now or self._stores.first <= self._horizon()
+        over = self._stores.first <= self._horizon()
         if events or over or wall - self._looked >= COMMIT_EVERY:
             self._looked = wall
             self._look()
@@ -126,7 +125,9 @@ class Driven(Mishaps):
                     self._place(axle, sent)
 
     def _forget(self) -> None:
-        oldest = self.past.forget(self.cell.now - self.plan.lead - self.lag - CERTAIN - SLACK)
+        oldest = self.past.forget(
+            min((self._left(axle) for axle in self.axles), default=self.cell.now) - CERTAIN - SLACK
+        )
         if oldest is None:
             return
         counts = iter(oldest.counts)

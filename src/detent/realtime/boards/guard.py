@@ -14,7 +14,7 @@ from detent.ticks import NEVER, Ns
 
 class _Tail(NamedTuple):
     level: Level
-    until: Ns  # cell time
+    at: Ns  # cell time of the last pulse that it watches, at the latest
 
 
 class Guard:
@@ -28,31 +28,31 @@ class Guard:
 
     @property
     def next(self) -> Ns:
-        """When an input is to be let go, by the time of the cell."""
-        return min((tail.until for tail in self._tails.values()), default=NEVER)
+        """The cell time up to which pulses must have left the pins before an input is let go."""
+        return min((tail.at for tail in self._tails.values()), default=NEVER)
 
-    def want(self, inputs: Mapping[str, Level], at: Ns, behind: Ns) -> None:
-        """From cell time `at` on these inputs cut the motion; what did before watches `behind` longer."""
+    def want(self, inputs: Mapping[str, Level], at: Ns, now: Ns) -> None:
+        """From cell time `at` on these inputs cut the motion; what did before watches the pulses given up to `now`."""
         for name, level in self.wanted.items():
             if inputs.get(name) != level:
-                self._tails[name] = _Tail(level, at + behind)
+                self._tails[name] = _Tail(level, now)
         self.wanted = dict(inputs)
-        self.refresh(at, at)
+        self._arm(at)
 
-    def refresh(self, now: Ns, at: Ns) -> None:
-        """Arm what is to be armed at cell time `now`; what is new counts from `at` on."""
-        self._tails = {name: tail for name, tail in self._tails.items() if tail.until > now and name not in self.wanted}
-        wished = {name: tail.level for name, tail in self._tails.items()} | self.wanted
+    def refresh(self, left: Ns, at: Ns) -> None:
+        """Every pulse up to cell time `left` has left the pins: let go what watched those alone."""
+        self._tails = {name: tail for name, tail in self._tails.items() if tail.at >= left}
+        self._arm(at)
+
+    def _arm(self, at: Ns) -> None:
+        tails = {name: tail.level for name, tail in self._tails.items() if name not in self.wanted}
+        wished = tails | self.wanted
         if wished != self.armed:
             self.armed = wished
             if wished:
                 self._stop.arm({name: bool(level) for name, level in wished.items()}, at)
             else:
                 self._stop.disarm()
-
-    def later(self, by: Ns) -> None:
-        """Pulses come so much later: what watches their last ones watches longer."""
-        self._tails = {name: tail._replace(until=tail.until + by) for name, tail in self._tails.items()}
 
     def fired(self) -> None:
         """The stop has fired: nothing is armed any more."""

@@ -157,7 +157,10 @@ class Leaving:
         return self.plan.lead + self.lag + CERTAIN if self.plan.held else 0
 
     def _horizon(self) -> Ns:
-        return self.cell.now - self._behind
+        """What the cell said up to then is certain: no stop can be earlier."""
+        if not self.plan.held:
+            return self.cell.now
+        return min((self._left(axle) for axle in self.axles), default=self.cell.now - self.plan.lead) - CERTAIN
 
     def _counts(self) -> tuple[int, ...]:
         return (
@@ -290,7 +293,7 @@ class Leaving:
             motion, inputs = axle.motion, self._cuts(axle)
             if inputs != axle.guard.wanted:
                 at = motion.at if motion is not None and not axle.guard.armed else now
-                axle.guard.want(inputs, at, self.plan.lead + axle.stepper.lag)
+                axle.guard.want(inputs, at, now)
                 self._pending = True
                 if inputs and not kept:
                     self.past.keep()
@@ -308,10 +311,16 @@ class Leaving:
                     inputs[name] = stop.level
         return inputs
 
+    def _left(self, axle: Axle) -> Ns:
+        """The cell time up to which every pulse of an axis has left the pins: sent, and a lead and its lag ago."""
+        due = axle.stepper.next_pulse()
+        sent = self.cell.now if due is None else min(due - 1, self.cell.now)
+        return sent - self.plan.lead - axle.stepper.lag
+
     def _refresh(self) -> None:
         for axle in self.axles:
-            if axle.guard.next <= self.cell.now:
-                axle.guard.refresh(self.cell.now, self.cell.now)
+            if axle.guard.next < self._left(axle):
+                axle.guard.refresh(self._left(axle), self.cell.now)
         self._arm()
 
     def _give(self, name: str, level: Level, board_ns: Ns) -> None:

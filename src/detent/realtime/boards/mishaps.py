@@ -39,7 +39,6 @@ class Mishaps(TakingBack):
                     self._place(axle, event.shaft)
             case Slipped(_, stepper, at, by):
                 self._later(self._by_stepper[stepper], at)
-                self._by_stepper[stepper].guard.later(by)
                 slips = self._by_stepper[stepper].stepper.slips
                 what = f"{stepper} slipped by {show_duration(by)}: the computer was late; no step is lost"
                 self._say(Weight.WARNING, f"{what} ({slips} {'slip' if slips == 1 else 'slips'} so far)")

@@ -45,8 +45,13 @@ class TakingBack(Leaving):
             self._fault(axle, f"{what}: leave the input out, and wire the detector to the driver")
             self._place(axle, event.shaft)
             return
-        # what the machine's other inputs are at was so at the stop already: motors stand, and reports take their time
-        others = {name: int(found) for name, found in event.levels.items() if name != event.input}
+        # what the other switches of this axis are at was so at the stop already: it stands, and reports take their time
+        switches = {(unit, other) for other in self.cell.controller(unit).switches(axle.what.axis)}
+        others = {
+            name: int(found)
+            for name, found in event.levels.items()
+            if name != event.input and self.plan.inputs[name] in switches
+        }
         late = {self.plan.inputs[name] for name in others}
         fresh = {(set_.unit, set_.pin) for when, set_, _ in self._reports if when > at}
         deeds: list[Deed] = []
@@ -130,7 +135,7 @@ class TakingBack(Leaving):
                 self._say(Weight.WARNING, what + instead)
         self._tell_axles(stopped, shaft, motions, counts)
         if stopped.standing is Standing.DRIVEN:  # before any pulse leaves; those that came and went meanwhile, too
-            stopped.guard.want(met, at, self.plan.lead + stopped.stepper.lag)
+            stopped.guard.want(met, at, self.cell.now)
         self._arm()
         self.commit()
         for out in self._outs.values():
