@@ -30,7 +30,7 @@ def boards(
     speed: int | None = None,
     json: bool = False,
 ) -> None:
-    """Find boards with Klipper firmware; boards check CELL.toml proves the wiring.
+    """Find boards with Klipper firmware; boards check proves a wiring.
 
     Without arguments every board in /dev/serial/by-id that calls itself Klipper is asked what it is; others only if
     they are named. It is left as it was.

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from detent.realtime.boards.drive import RealPins
     from detent.realtime.endpoints.tcp import TcpAddress
     from detent.realtime.endpoints.wanted import Wanted
+    from detent.realtime.notify import Notifier
     from detent.realtime.service import Served, Service
 
 
@@ -37,6 +38,7 @@ def serve(
     token: str | None = None,
     real: Annotated[bool, Parameter(negative=())] = False,
     realtime: Annotated[bool, Parameter(negative=())] = False,
+    wait: Annotated[bool, Parameter(negative=())] = False,
     json: bool = False,
 ) -> None:
     """Serve a controller or a cell in real time, until Ctrl-C.
@@ -76,6 +78,8 @@ def serve(
         Drive the pins of the boards in the cell file: steps, outputs and inputs of [boards] and [hardware].
     realtime
         Take real-time priority, so that a busy computer makes no step late.
+    wait
+        Wait for boards and serial ports that are not plugged in yet, in whatever order they come.
     json
         Print one line of JSON once everything is open, and nothing else.
     """
@@ -86,6 +90,7 @@ def serve(
     from detent.realtime.boards.drive import take_priority
     from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost
     from detent.realtime.images import Images, ImagesUnusable, default_folder
+    from detent.realtime.notify import Notifier
     from detent.realtime.service import Service, models
 
     links = list(pty) if pty is not None else None
@@ -105,12 +110,15 @@ def serve(
         images = Images.of(folder, target, models(found.description), is_file=bool(found.description.file))
     except (Problem, ImagesUnusable) as error:
         asked_wrongly(error)
+    notifier = Notifier(os.environ)
     try:
         try:
-            pins = _real_pins() if real else None
+            if wait:
+                _wait(found.description, wanted, real, notifier)
+            pins = _real_pins(notifier) if real else None
             service = Service(found.description, found.read, wanted, pace=pace, line_timing=line_timing,
                               images=images, observed=control_at is not None, on_stop=_tell_stop,
-                              real=pins)  # fmt: skip
+                              real=pins, timers=(notifier,))  # fmt: skip
             url = _control(service, control_at, token)
         except (Problem, EndpointError) as error:
             asked_wrongly(error)
@@ -127,16 +135,20 @@ def serve(
                 print(json_text.dumps(_facts(service, url)), flush=True)
             else:
                 _print_ready(service, found.description, folder, pace, url)
+            notifier.ready(f"serving {', '.join(found.description.units)}")
             gc.freeze()  # what is there now stays: no collection shall look at it while a deadline waits
             try:
                 service.run()
             except EndpointLost as error:
                 failed(error)
+            finally:
+                notifier.stopping()
         if not json:
             _print_end(service)
         if service.stopped:
             raise SystemExit(FAILED)
     finally:
+        notifier.close()
         images.close()
 
 
@@ -190,13 +202,35 @@ def _control(service: "Service", address: "TcpAddress | None", token: str | None
     return http.url
 
 
-def _real_pins() -> "RealPins":
-    """What people should know of real pins is a line on stderr, with the time of the cell."""
+def _wait(description: "Description", wanted: "Sequence[Wanted]", real: bool, notifier: "Notifier") -> None:
+    """Until every device is there; told once which are not."""
+    from detent.realtime.appearing import devices, wait_for
+
+    needed = devices(description, wanted, real=real)
+
+    def tell(missing: Sequence[str]) -> None:
+        text = "waiting for " + ", ".join(f"{device} ({needed[device]})" for device in missing)
+        print(f"detent: {text}", file=sys.stderr, flush=True)
+        notifier.status(text)
+
+    wait_for(list(needed), tell)
+
+
+def _real_pins(notifier: "Notifier") -> "RealPins":
+    """What people should know of real pins is a line on stderr, with the time of the cell.
+
+    A service manager is told how much each matters, by the prefix that its journal takes (sd-daemon(3)).
+    """
     from detent.realtime.boards.drive import RealPins
-    from detent.realtime.boards.states import News
+    from detent.realtime.boards.states import News, Weight
+
+    grave = {Weight.FAULT: "<3>", Weight.WARNING: "<4>"} if notifier.heard else {}
 
     def tell(news: News) -> None:
-        print(f"detent: {news.at / 1e9:.3f} s: {news.weight.value}: {news.text}", file=sys.stderr, flush=True)
+        if news.weight is not Weight.NOTE:
+            notifier.status(f"{news.weight.value} at {news.at / 1e9:.3f} s: {news.text}")
+        weight = f"{grave.get(news.weight, '')}detent: {news.at / 1e9:.3f} s: {news.weight.value}"
+        print(f"{weight}: {news.text}", file=sys.stderr, flush=True)
 
     return RealPins(tell)
 

@@ -17,6 +17,7 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from pathlib import Path
+from time import monotonic_ns
 from typing import Any, Protocol, TypeAlias, TypeVar
 
 from detent.lines.line import Heard
@@ -92,11 +93,22 @@ class Companion(Protocol):
         """The cell is at its present, and what could be read was: called once in each wake-up."""
 
 
+class Timer(Protocol):
+    """What is done from time to time while the loop lives: the watchdog of a service manager. Times are the pace's."""
+
+    def deadline(self) -> WallNs | None:
+        """When `due` is to be called at the latest."""
+
+    def due(self, wall: WallNs) -> None:
+        """It may be time; called once in each wake-up."""
+
+
 class Loop:
     """Serves `cell` at `pace`; `endpoints` are pairs of a line and what clients of it connect to.
 
     Several endpoints on a line share it: every one hears everything. `patience` is how far, in cell time, the
-    host of each line may be behind before its clients have to wait. A `companion` is served along with it.
+    host of each line may be behind before its clients have to wait. A `companion` is served along with it, and `timers`
+    by the clock of the host.
     """
 
     def __init__(
@@ -108,7 +120,9 @@ class Loop:
         patience: Sequence[Ns] | None = None,
         wait: Wait = select.select,
         companion: Companion | None = None,
+        timers: Sequence[Timer] = (),
     ) -> None:
+        self._timers = tuple(timers)
         self._cell, self._pace, self._wait, self._companion = cell, pace, wait, companion
         self._endpoints = list(endpoints)
         self._of_line: dict[int, list[Endpoint]] = defaultdict(list)
@@ -230,6 +244,8 @@ class Loop:
             due = endpoint.deadline()
             if due is not None and due <= wall:
                 endpoint.due(wall)
+        for timer in self._timers:
+            timer.due(monotonic_ns())
 
     def _timeout(self) -> float | None:
         """Seconds to sleep at most; None if only a client can start anything."""
@@ -245,10 +261,12 @@ class Loop:
             other = self._companion.deadline()
             if other is not None and (due is None or other < due):
                 due = other
-        if due is None:
+        left = LONGEST_SLEEP if due is None else due - self._pace.clock()
+        times = [at - monotonic_ns() for timer in self._timers if (at := timer.deadline()) is not None]
+        if due is None and not times:
             return None
-        left = due - self._pace.clock()
-        return min(left, LONGEST_SLEEP) / SECOND if left > 0 else 0.0
+        left = min(left, LONGEST_SLEEP, *times)
+        return left / SECOND if left > 0 else 0.0
 
     def _catch_up(self) -> None:
         """Run the cell to the present, deadline by deadline, and note how late each was served."""

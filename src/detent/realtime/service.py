@@ -23,7 +23,7 @@ from detent.realtime.endpoints.endpoint import Endpoint
 from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.guarded import Guarded
 from detent.realtime.images import Images
-from detent.realtime.loop import BEHIND, Loop, stopped_by_signals, wake_exactly
+from detent.realtime.loop import BEHIND, Loop, Timer, stopped_by_signals, wake_exactly
 from detent.realtime.pace import LatenessSummary, Pace
 from detent.realtime.waiting import Watched
 from detent.realtime.watch import Lately, Watch
@@ -56,17 +56,19 @@ class Service:
         observed: bool = False,
         on_stop: Callable[[str], None] = lambda why: None,
         real: RealPins | None = None,
+        timers: Sequence[Timer] = (),
     ) -> None:
         """Build the cell and open what is `wanted` for every line; nothing: what the cell file says, or a pty.
 
         `images` stay their owner's. One that is `observed` can be looked at and meddled with (`realtime.control`).
         `on_stop` is told when the cell cannot go on; it is served all the same. With `real` it drives the boards of its
-        cell file. Raises Problem, EndpointError, ValueError.
+        cell file. `timers` are called by the loop. Raises Problem, EndpointError, ValueError.
         """
         self.description = description
         self.driven: Driven | None = None
         self.reports: list[str] = []  # about images that could not be used, and what a real cell would not stand
-        if wanted and any(w.kind == "serial" for w in wanted):
+        ends = [line.endpoint for line in description.lines.values() if line.endpoint and not wanted]
+        if any(w.kind == "serial" for w in wanted) or (ends and all(end.startswith("serial:") for end in ends)):
             line_timing = False  # the wire outside takes the time
         if real is not None and pace != 1:
             raise Problem("", "pace", "real pins keep real time: leave the pace at 1")
@@ -101,7 +103,8 @@ class Service:
             self.watched = Watched(self.driven or self.cell, self.pace) if observed else None
             self.guarded = Guarded(self.watched or self.driven or self.cell, self._stopped)
             self._on_stop = on_stop
-            self._loop = Loop(self.guarded, self.pace, self._opened, patience=patience, companion=self.driven)
+            self._loop = Loop(self.guarded, self.pace, self._opened, patience=patience, companion=self.driven,
+                              timers=timers)  # fmt: skip
             opening.callback(self._loop.close)
             self._cleanup = opening.pop_all()
 

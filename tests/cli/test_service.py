@@ -1,0 +1,136 @@
+"""The verb `service`: the unit is sound for systemd, and says what will not go well."""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from detent.cli import main
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+BY_ID = "/dev/serial/by-id"
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    status: object = 0
+    try:
+        main(words)
+    except SystemExit as end:
+        status = end.code
+    told = capsys.readouterr()
+    return int(str(status or 0)), told.out, told.err
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Path:
+    """A cell with by-id names, in a folder that has to be quoted."""
+    folder = tmp_path / "a 100% machine's $cell"
+    shutil.copytree(EXAMPLES / "replacement", folder)
+    path = folder / "pico-gs-c200.toml"
+    text = (
+        path.read_text()
+        .replace('"fake:rp2040"', f'"{BY_ID}/usb-Klipper_rp2040_1-if00"')
+        .replace("# endpoint", "endpoint")
+    )
+    path.write_text(text)
+    return path
+
+
+def test_the_unit_is_what_a_service_needs(cell: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, err = run(capsys, "service", str(cell), "--user", "detent", "--control", "127.0.0.1:8400")
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    for line in (
+        "Type=notify", "WatchdogSec=5", "Restart=on-failure", "StateDirectory=detent-pico-gs-c200", "User=detent",
+        "LimitRTPRIO=95", "TimeoutStartSec=infinity", "WantedBy=multi-user.target",
+    ):  # fmt: skip
+        assert line in lines
+    command = next(line for line in lines if line.startswith("ExecStart="))
+    assert command.endswith("--wait --real --realtime --control 127.0.0.1:8400 --state %S/detent-pico-gs-c200")
+    assert "a 100%% machine's $$cell" in command
+
+
+def verify(place: Path) -> subprocess.CompletedProcess[str]:
+    words = ["systemd-analyze", "verify", "--man=no", str(place)]
+    return subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not here")
+def test_systemd_finds_it_sound(cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "detent-slide.service"
+    status, _, err = run(capsys, "service", str(cell), "--user", "daemon", "--output", str(place))
+    assert (status, err) == (0, "")
+    done = verify(place)
+    told = [line for line in done.stderr.splitlines() if place.name in line]
+    assert (done.returncode, told) == (0, []), done.stderr
+    wrong = tmp_path / "detent-wrong.service"  # proves that it looks at all
+    wrong.write_text(place.read_text().replace(sys.executable, "/no/such/python"))
+    assert "/no/such/python" in verify(wrong).stderr
+
+
+def test_a_file_is_never_written_over_unasked(cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "x.service"
+    place.write_text("mine")
+    status, out, err = run(capsys, "service", str(cell), "--user", "a", "--output", str(place))
+    assert (status, out, place.read_text()) == (2, "", "mine")
+    assert "is there already: write over it with --force" in err
+    status, out, _ = run(capsys, "service", str(cell), "--user", "a", "--output", str(place), "--force")
+    assert status == 0
+    assert "sudo systemctl enable --now detent-pico-gs-c200" in out
+    assert place.read_text().startswith("# Made by `detent service pico-gs-c200.toml`")
+
+
+def test_what_will_not_go_well_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cell = tmp_path / "cell.toml"
+    text = (EXAMPLES / "replacement" / "printer-board-gs-c200.toml").read_text()
+    cell.write_text(text)
+    status, _, err = run(capsys, "service", str(cell), "--user", "root")
+    assert status == 0
+    assert "boards.skr.serial: fake:stm32 drives no pin" in err
+    assert "no line says where its host is" in err
+    assert "it will run as root" in err
+    cell.write_text(text.replace("fake:stm32", "/dev/ttyACM0"))
+    assert (
+        "boards.skr.serial: /dev/ttyACM0 may be another device at the next start"
+        in run(capsys, "service", str(cell))[2]
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (("gs-c200",), "gs-c200 is no cell file"),
+        (("CELL", "--name", "a/b"), "--name: 'a/b'"),
+        (("CELL", "--user", "a b"), "--user: 'a b'"),
+        (("CELL", "--control", "8400"), "--control"),
+        (("nothing.toml",), "nothing.toml: cannot read it"),
+    ],
+)
+def test_asked_wrongly(words: tuple[str, ...], error: str, cell: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, err = run(capsys, "service", *(str(cell) if word == "CELL" else word for word in words))
+    assert (status, out) == (2, "")
+    assert error in err
+    assert err.count("\n") == 1
+
+
+def test_serve_is_ready_is_alive_and_says_when_it_stops(tmp_path: Path) -> None:
+    at = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    at.bind(str(tmp_path / "notify"))
+    at.settimeout(60)
+    environment = {**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "2000000"}
+    cell = EXAMPLES / "replacement" / "printer-board-gs-c200.toml"
+    words = [sys.executable, "-m", "detent", "serve", str(cell), "--real", "--wait", "--state", str(tmp_path / "state")]
+    with at, subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as served:
+        heard = [at.recv(4096).decode()]
+        while "WATCHDOG=1" not in heard:
+            heard.append(at.recv(4096).decode())
+        served.send_signal(signal.SIGTERM)
+        while heard[-1] != "STOPPING=1":
+            heard.append(at.recv(4096).decode())
+        assert served.wait(60) == 0
+    assert heard[0] == "READY=1\nSTATUS=serving x, y"
