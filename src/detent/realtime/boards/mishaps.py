@@ -37,6 +37,9 @@ class Mishaps(TakingBack):
                 elif axle.standing is Standing.DRIVEN:
                     self._fault(axle, "the board has stopped it, and does not say why")
                     self._place(axle, event.shaft)
+                else:  # steps that had left when it failed have met a switch
+                    axle.guard.fired()
+                    self._place(axle, event.shaft)
             case Slipped(_, stepper, at, by):
                 self._later(self._by_stepper[stepper], at)
                 slips = self._by_stepper[stepper].stepper.slips
@@ -88,7 +91,7 @@ class Mishaps(TakingBack):
         self.cell.halt(axle.what.unit)
         self._absorb()  # the stepper is told, while it still is
         axle.standing, axle.why, axle.known = Standing.FAULT, why, known
-        axle.guard.release()
+        axle.guard.want({}, self.cell.now, self.cell.now)  # what has left is watched until it is over
         self.past.clear()
         if first:
             self._say(Weight.FAULT, f"{axle.name} stands: {why}; look at the machine, then recover")
@@ -162,6 +165,7 @@ class Mishaps(TakingBack):
         self._say(Weight.NOTE, f"{axle.name} goes on at {shaft}")
 
     def _driven_again(self, axle: Axle) -> None:
+        axle.guard.release()
         axle.standing, axle.why, axle.known = Standing.DRIVEN, "", True
         unit = self.cell.unit(axle.what.unit)
         for out in self._outs.values():
