@@ -4,7 +4,7 @@ Whatever cannot be built is a `Problem` with the key and the remedy, and nothing
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
 from detent.cell import real_pins
@@ -12,8 +12,6 @@ from detent.cell.cell import Cell
 from detent.cell.deeds import Action, Power, SetSwitch, Type
 from detent.cell.delivery import Store, Typed, no_store, nobody_asks
 from detent.cell.description import Description, Motor, Problem, ScriptEntry, Unit
-from detent.cell.fitting import check_names, mechanics, motors_by_axis, split_axis, with_own_motors
-from detent.cell.mechanics import Mechanics
 from detent.cell.parts import PARTS, Part
 from detent.cell.switches import AxisSwitch, Switch
 from detent.cell.wiring import Wiring
@@ -27,6 +25,9 @@ from detent.lines.party_line import PartyLine
 from detent.lines.sin import Adapter
 from detent.pins import HIGH, Level, Net, Pin, PinKind
 from detent.ticks import SECOND, round_ratio
+
+if TYPE_CHECKING:
+    from detent.cell.mechanics import Mechanics
 
 LINES: Mapping[str, type[Line]] = {"serial": Line, "microbus": Microbus}
 
@@ -65,7 +66,11 @@ class _End(NamedTuple):
 
 class _Builder:
     def __init__(self, description: Description, read: Read) -> None:
-        self.description, self.read = with_own_motors(description, read), read
+        if description.motors:  # the motor model takes as long to load as all the rest
+            from detent.cell.fitting import with_own_motors
+
+            description = with_own_motors(description, read)
+        self.description, self.read = description, read
         self.models: dict[str, Model | Part] = {}
         self.names: list[str] = []
         self.parts: list[Device] = []
@@ -142,7 +147,7 @@ class _Builder:
             what = f"{entry.supply:g} V: the motors of a {found.name} have {low:g} to {high:g} V"
             raise self.problem(f"motors.{name}.supply", what)
 
-    def look_at_windings(self, name: str, entry: Motor, made: Mechanics) -> None:
+    def look_at_windings(self, name: str, entry: Motor, made: "Mechanics") -> None:
         """Remark on a motor that draws more current than its power stage stands."""
         found = self.models.get(entry.unit or "")
         if entry.unit is None or not isinstance(found, Model):
@@ -293,6 +298,10 @@ class _Builder:
 
     def make_motors(self, record: bool) -> None:
         described = self.description
+        if not described.motors:
+            return
+        from detent.cell.fitting import check_names, mechanics, motors_by_axis, split_axis
+
         check_names(described, [*described.units, *described.switches])
         on_axis = motors_by_axis(described)
         for name, entry in described.motors.items():
@@ -424,9 +433,8 @@ class _Builder:
                 self.parts[part].watch(pin)
         for readers in reads:
             for part, pin in readers:
-                found = self.parts[part]
-                if isinstance(found, Mechanics):
-                    found.wired(pin)
+                if self.names[part] in self.description.motors:
+                    cast("Mechanics", self.parts[part]).wired(pin)
         followers = [tuple(s for s, unit in self.axes.items() if unit == part) for part in range(len(self.parts))]
         hears: list[tuple[tuple[int, str], ...]] = []
         speaks: list[dict[str, tuple[int, int]]] = [{} for _ in range(units)]

@@ -48,5 +48,5 @@ DurationField = Annotated[Ns, BeforeValidator(_duration)]
 Names = Annotated[list[str], BeforeValidator(_list)]
 
 
-STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 """A table of a cell file: no other keys, nothing changes, every number is finite."""

@@ -39,10 +39,11 @@ class Wanted(NamedTuple):
 
     def check(self, inputs: Sequence[Path], *, force: bool) -> None:
         """ValueError for files that cannot be written so, before anything is run."""
-        from detent.outputs.figures import check
         from detent.outputs.files import check_place
 
         if self.plot is not None:
+            from detent.outputs.figures import check
+
             check(self.plot)
         if self.sr_rate is not None and (self.sr is None or self.sr_rate < 1):
             raise ValueError(f"--sr-rate is for --sr, in samples a second, and at least 1, not {self.sr_rate}")

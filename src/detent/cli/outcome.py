@@ -1,5 +1,6 @@
 """What `run` tells at its end: where everything is, what was said, what was refused, what was lost."""
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -145,44 +146,40 @@ def _moving(told: Outcome) -> list[str]:
 
 def show(told: Outcome, written: Sequence[Path]) -> None:
     """Where everything ended, for people."""
-    from rich.console import Console
-    from rich.table import Table
-
     from detent.ticks import show_duration
 
-    console = Console(highlight=False)
     cell, conversation = told.cell, told.conversation
     conversation.listen()
     several = len(cell.controllers()) > 1
     for speaker, lines in told.said.items():
         for line in lines:
-            console.print(f"< {speaker + ': ' if several else ''}{line}", markup=False)
+            print(f"< {speaker + ': ' if several else ''}{line}")
     scripted = 0
     for one in conversation.exchanges:
         scripted += one.scripted
         if one.scripted and scripted > MOST_SHOWN:
             continue
         when = f"{show_duration(one.at) if one.at else '0 s'} " if one.scripted else ""
-        console.print(f"{when}> {one.unit + ': ' if several else ''}{one.sent}", markup=False)
+        print(f"{when}> {one.unit + ': ' if several else ''}{one.sent}")
         for answer in conversation.answers(one):
-            console.print(f"< {answer}", markup=False)
+            print(f"< {answer}")
     if scripted > MOST_SHOWN:
-        console.print(f"... and {scripted - MOST_SHOWN} more lines of the script: --json has them all", markup=False)
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for column in ("unit", "model", "position", "pulses", "state"):
-        table.add_column(column, justify="right" if column in ("position", "pulses") else "left")
+        print(f"... and {scripted - MOST_SHOWN} more lines of the script: --json has them all")
+    rows = []
     moving = _moving(told)
     at_work = []
     for name, unit in cell.controllers().items():
         for axis in unit.axes:
             status = unit.status(cell.now, axis)
             shown = f"{name}.{axis}" if axis else name
-            table.add_row(shown, unit.model, str(status.position), str(status.pulses), status.state)
+            rows.append((shown, unit.model, str(status.position), str(status.pulses), status.state))
             if shown in moving or status.state in ("running", "homing"):
                 at_work.append(shown)
-    console.print(table)
+    _table(("unit", "model", "position", "pulses", "state"), rows, right=("position", "pulses"))
     if told.motors:
-        console.print(_rotors(told.motors))
+        stand = [(one.name, f"{one.place:.2f}", f"{one.commanded:.2f}", str(one.lost)) for one in told.motors]
+        titles = ("motor", "rotor at", "commanded", "steps lost")
+        _table(titles, stand, right=titles[1:])
     time = show_duration(cell.now)
     match told.ended:
         case "idle" if at_work:
@@ -200,15 +197,17 @@ def show(told: Outcome, written: Sequence[Path]) -> None:
         print(f"Wrote {path}")
 
 
-def _rotors(motors: Sequence[Rotor]) -> object:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for column in ("motor", "rotor at", "commanded", "steps lost"):
-        table.add_column(column, justify="left" if column == "motor" else "right")
-    for motor in motors:
-        table.add_row(motor.name, f"{motor.place:.2f}", f"{motor.commanded:.2f}", str(motor.lost))
-    return table
+def _table(titles: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[str]) -> None:
+    """Print columns, those of numbers to the `right`; without rich, which takes longer to load than a run takes."""
+    widths = [max(len(row[k]) for row in (titles, *rows)) for k in range(len(titles))]
+    dim, plain = ("\033[2m", "\033[0m") if sys.stdout.isatty() and "NO_COLOR" not in os.environ else ("", "")
+    for row in (titles, *rows):
+        cells = [
+            text.rjust(width) if title in right else text.ljust(width)
+            for title, text, width in zip(titles, row, widths, strict=True)
+        ]
+        line = "  ".join(cells)
+        print(f"{dim}{line}{plain}" if row is titles else line)
 
 
 def warn(told: Outcome) -> None:

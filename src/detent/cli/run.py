@@ -111,7 +111,7 @@ def run(
     course = _Course(cell, conversation, until)
     try:
         ended = course.run(lines)
-        motors = outcome.motors(cell)
+        motors = outcome.motors(cell) if found.description.motors else []
     except (Oscillation, MotorError) as error:
         failed(error)
     told = outcome.Outcome(cell, ended, conversation, course.sent, course.unsent, list(witness.moving), motors)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from detent.cell.description import Description, Problem, Switch, parse, single
-from detent.cell.fitting import with_own_motors
 from detent.cell.parts import PARTS
 from detent.controllers import catalogue
 from detent.pins import PinKind
@@ -42,7 +41,10 @@ def target(
             raise Problem(text, "", f"cannot read it: {getattr(error, 'strerror', None) or error}") from None
         description = _with_pins(_with_choices(parse(source, text), straps, options, programs), pins, "")
         of_motors = [entry.motor for entry in description.motors.values() if entry.motor.endswith(".toml")]
-        description = with_own_motors(description, lambda file: read_text(path.parent / file))
+        if of_motors:
+            from detent.cell.fitting import with_own_motors
+
+            description = with_own_motors(description, lambda file: read_text(path.parent / file))
         files = [*of_motors]
         files += [file for unit in description.units.values() for file in (unit.program, unit.eeprom) if file]
         inputs = (path, *(path.parent / file for file in files))
