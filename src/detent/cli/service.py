@@ -1,6 +1,7 @@
 """The verb `service`: a systemd unit that serves a cell from power-on, as the box did that it replaces."""
 
 import getpass
+import json as json_text
 import re
 import shlex
 import sys
@@ -24,6 +25,7 @@ def service(
     control: str | None = None,
     output: Path | None = None,
     force: Annotated[bool, Parameter(negative=())] = False,
+    json: bool = False,
 ) -> None:
     """Print a systemd unit that serves a cell from power-on.
 
@@ -47,6 +49,8 @@ def service(
         Write the unit to this file instead of printing it, and say what to do with it.
     force
         Write over a file that is there.
+    json
+        Print name, text and remarks as one line of JSON.
     """
     from detent.cell.description import Problem
     from detent.cli.endings import asked_wrongly, failed
@@ -70,16 +74,22 @@ def service(
             raise Problem("", "--output", f"{output} is there already: write over it with --force, or elsewhere")
     except Problem as problem:
         asked_wrongly(problem)
-    for remark in _remarks(found.description, who):
+    remarks = _remarks(found.description, who)
+    for remark in () if json else remarks:
         print(f"detent: {remark}", file=sys.stderr)
     text = unit(found.description, Path(cell).resolve(), called, who, control)
+    if output is not None:
+        try:
+            write_whole(output, text.encode())
+        except OSError as error:
+            failed(f"{output}: cannot write there: {error.strerror}")
+    if json:
+        file = None if output is None else str(output)
+        print(json_text.dumps({"name": called, "file": file, "unit": text, "remarks": remarks}))
+        return
     if output is None:
         print(text, end="")
         return
-    try:
-        write_whole(output, text.encode())
-    except OSError as error:
-        failed(f"{output}: cannot write there: {error.strerror}")
     place = UNITS / f"{called}.service"
     print(f"{output} is written. To start it now and with the machine:")
     if output.resolve() != place:
