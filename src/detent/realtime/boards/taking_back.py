@@ -75,7 +75,7 @@ class TakingBack(Leaving):
     def _gates(self, axle: Axle, event: Stopped) -> bool:
         """Whether an input has stopped every single pulse of late."""
         last = axle.held
-        alone = last is not None and last[0] == event.input and abs(event.shaft - last[1]) == 1
+        alone = last is not None and last[0] == event.input and abs(event.shaft - last[1]) <= 1
         axle.held = event.input, event.shaft
         axle.singles = axle.singles + 1 if alone else 0
         return axle.singles >= MOST_SINGLES
@@ -135,7 +135,10 @@ class TakingBack(Leaving):
                 self._say(Weight.WARNING, what + instead)
         self._tell_axles(stopped, shaft, motions, counts)
         if stopped.standing is Standing.DRIVEN:  # before any pulse leaves; those that came and went meanwhile, too
-            stopped.guard.want(met, at, self.cell.now)
+            final = self._cuts(stopped)
+            # what came and went meanwhile, but for a level that is there already: that was for later
+            watched = {n: lv for n, lv in met.items() if final.get(n) == lv or self._raw.get(n) != lv}
+            stopped.guard.want(watched, at, self.cell.now)
         self._arm()
         self.commit()
         for out in self._outs.values():
