@@ -163,7 +163,7 @@ def test_a_restore_that_is_interrupted_names_both_files_and_can_be_done_again(
         assert f"detent restore gs-c200s {address(service)} {kept} what it held before" in err
         # the module is still in programming mode, where X is "not allowed" (E4)
         run("restore", "gs-c200s", address(service), kept, "--yes")
-        run("backup", "gs-c200s", address(service), file)
+        run("backup", "gs-c200s", address(service), file, "--force")
     assert Backup.parse(file.read_text()).saved["program"] == ["C1"]
     assert "ram" not in Backup.parse(file.read_text()).saved
 
@@ -218,6 +218,26 @@ def test_files_that_cannot_be_read_or_written_are_told(tmp_path: Path, capsys: p
     with served("gs-c200") as service:
         run("backup", "gs-c200", address(service), tmp_path, status=1)
     assert f"{tmp_path}: not written" in capsys.readouterr().err
+
+
+def test_a_second_backup_keeps_the_first_and_both_say_how_they_go_back(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "unit.toml"
+    file.write_text("mine")
+    with served("gs-c200", straps={"CHS": "low"}) as service:
+        unit = ("gs-c200", address(service), file, "--no-checksum", "--baud", 9600)
+        run("backup", *unit)
+        run("backup", *unit, "--json")
+        out, err = capsys.readouterr()
+        assert file.read_text() == "mine"
+        assert f"{file} is there and is kept; --force writes over it" in err
+        assert json.loads(out.splitlines()[-1])["file"] == str(tmp_path / "unit-3.toml")
+        text = (tmp_path / "unit-2.toml").read_text()
+        assert "detent restore gs-c200 PORT FILE --no-checksum --baud 9600\n" in text
+        run("backup", *unit, "--force")
+    assert Backup.parse(file.read_text()).model == "gs-c200"
+    assert sorted(path.name for path in tmp_path.glob("unit*")) == ["unit-2.toml", "unit-3.toml", "unit.toml"]
 
 
 def test_a_backup_is_toml_whatever_it_holds() -> None:

@@ -90,7 +90,7 @@ def test_a_port_that_is_not_there_is_told_in_one_line(capsys: pytest.CaptureFixt
 def test_where_nobody_answers_it_ends_with_1(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     with served("supersigma") as service:
         run(address(service), "--model", "bs0610", status=1)
-    assert capsys.readouterr().out.startswith("Nothing was found.")
+    assert capsys.readouterr().out.startswith("Nothing was found at ")
 
 
 @pytest.mark.parametrize(

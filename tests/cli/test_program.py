@@ -41,6 +41,20 @@ def test_a_program_goes_up_with_its_labels_and_comes_back(
         assert json.loads(capsys.readouterr().out)["lines"] == ["A1", "D1", "C1", "j0"]
 
 
+def test_a_download_replaces_nothing_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    kept, new = tmp_path / "kept.src", tmp_path / "new.src"
+    kept.write_text("mine")
+    run("download", "gs-c200s", "PORT", "--output", kept, status=2)
+    run("download", "gs-c200s", "PORT", kept, status=2)
+    run("download", "gs-c200s", "PORT", kept, "--output", new, status=2)
+    assert kept.read_text() == "mine"
+    assert "is there: write to another file, or over it with --force" in capsys.readouterr().err
+    with served("gs-c200s") as service:
+        run("download", "gs-c200s", address(service), "--output", new)
+        run("download", "gs-c200s", address(service), "--output", kept, "--force")
+    assert kept.read_text() == new.read_text() != "mine"
+
+
 def test_a_program_that_is_saved_survives_in_the_eeprom(source: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with served("gs-c200s") as service:
         run("upload", "gs-c200s", address(service), source, "--save", "--json")

@@ -92,10 +92,66 @@ def test_every_model_is_spoken_to_in_its_own_way(capsys: pytest.CaptureFixture[s
     assert out == "> X\n<   26\n"  # "the model, in party line" (page 52)
     with served("bs0610") as service:
         out, _ = told(capsys, "bs0610", address(service), "--patience", "10", "X100GI", "--", "-1?", "500")
-    assert out.splitlines() == ["> X100GI", "< *  (done)", "> -1?", "< X,-1,100", "< *", "> 500", "< *  (done)"]
+    assert out.splitlines() == [
+        "> X100GI",
+        "< *  (done)",
+        "> -1?",
+        "< X,-1,100  (X: position 100)",
+        "< *",
+        "> 500",
+        "< *  (done)",
+    ]
     with served("supersigma") as service:
         out, _ = told(capsys, "supersigma", address(service), "--patience", "10", "status", "move +100")
     assert out == "> status\n< 0 steps  (at rest)\n> move +100\n<  (sent; status tells what comes of it)\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("Q", "Q is no command"),
+        ("1000Q", "Q is no command"),
+        ("X7M", "M takes 0 to 1, not 7"),
+        ("X9W", "W takes 0 to 2, not 9"),
+        ("X5O", "O takes 0 to 3, not 5"),
+        ("5HX1W", "H takes 0 to 1, not 5"),
+    ],
+)
+def test_what_a_board_ignores_is_not_done(line: str, why: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Page 24: a board answers every character, whether it means anything or not."""
+    with served("bs0610") as service:
+        out, _ = told(capsys, "bs0610", address(service), "--patience", "10", line, status=1)
+    assert out == f"> {line}\n< *  (ignored: {why})\n"
+
+
+def test_reports_of_a_board_have_their_meaning(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("bs0610") as service:
+        out, _ = told(capsys, "bs0610", address(service), "--patience", "10", "X800R", "--", "X-10?", "X-8?", "X0?")
+    assert "< X,-10,800  (X: run rate 800)" in out
+    assert "< X,-8,0  (X: action idle)" in out
+    assert "run rate 800, stop rate 80)" in out
+
+
+def test_a_wait_of_a_board_has_an_end(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("bs0610") as service:
+        _, err = told(capsys, "bs0610", address(service), "--patience", "1", "--wait", "0.1", "X100000G", "I", status=1)
+    assert "does not say within 0.1 s that it is idle" in err
+
+
+def test_another_controller_behind_a_port_is_told_with_what_looks_for_it(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("bs0610") as service:
+        port = address(service)
+        out, err = told(capsys, "gs-c200", port, "--patience", "0.3", "+100", status=1)
+        assert "(what came reads like a GenStepper board, bs0610)? See: detent find " + port in err
+        assert "position()" not in out + err
+
+
+def test_a_program_of_a_dcb_274_is_traced_as_it_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    """Page 38: G with 1 prints each instruction."""
+    with served("dcb-274") as service:
+        out, _ = told(capsys, "dcb-274", address(service), "--patience", "2", "P 0", "+ 10", "W 0", "P", "G 0 1")
+    assert "(the program has ended)" in out
+    assert "+ 10" in next(line for line in out.splitlines() if line.startswith("|"))
 
 
 def test_single_characters_of_the_dcb_274_are_typed_as_words(capsys: pytest.CaptureFixture[str]) -> None:

@@ -106,6 +106,14 @@ def test_the_verb_lists_pages_questions_and_answers(capsys):
         ["bs0610", "resistance=12"],
         ["bs0610", "voltage=0", "resistance=1"],
         ["bs0610", "voltage=1", "resistance=1", "supply=AB"],
+        ["bs0610", "voltage=12", "current=1", "resistance=12"],
+        ["gs-c200", "ramp=1"],
+        ["gs-c200-current", "ramp=3"],
+        ["gs-c200-current", "ramp=2.6", "drive=GS-D200S"],
+        ["gs-c200-slew", "force=-1", "length=1", "time=1", "torque=1"],
+        ["gs-c200-slew", "force=0", "length=1", "time=1", "torque=1"],
+        ["gs-c200-slew", "force=1", "length=1", "time=1e6", "torque=1"],
+        ["gs-c200-slew", "force=1", "length=1", "time=1", "torque=1", "steps=0"],
     ],
 )
 def test_a_wrong_question_ends_with_2_and_a_remedy(words, capsys):
@@ -121,6 +129,29 @@ def test_dcb_274_currents_are_percents_of_4_amperes_and_the_supply_is_twice_the_
     assert facts["supply_v"] == {"least": 28, "most": 40}
     assert run("dcb-274", "current=3.2", "resistance=1", "hold=0") == 0  # the quiet mode of page 53
     assert "Y 0 80" in capsys.readouterr().out
+
+
+def test_what_is_printed_with_json_is_json_always(capsys):
+    for words in ([], ["gs-c200"], ["gs-c200-slew"], ["gs-c200-current", "ramp=1.5", "drive=GS-D200S"]):
+        assert run(*words, "--json") == 0
+        assert json.loads(capsys.readouterr().out)
+
+
+def test_a_controller_of_several_pages_lists_them(capsys):
+    assert run("gs-c200") == run("gs-c200s") == 0
+    assert capsys.readouterr().out.count("gs-c200-slew ") == 2
+
+
+def test_page_24_half_power_ends_above_the_auto_full_power_rate(capsys):
+    assert run("bs0610", "voltage=12", "resistance=40", "mode=2", "half_power=yes") == 0
+    assert "0A or a run rate below it (page 24)" in capsys.readouterr().out
+
+
+def test_resistors_are_those_of_the_drive_and_what_they_make_is_told(capsys):
+    assert run("gs-c200-current", "rest=0.25", "slew=0.5", "ramp=1.5", "drive=GS-D200S") == 0
+    out = capsys.readouterr().out
+    assert "rest 0.2" in out
+    assert "E24" in out
 
 
 @pytest.mark.parametrize(("speed", "decay"), [(90, 25), (180, 50), (360, 100), (720, 200)])

@@ -35,6 +35,25 @@ def measured(leads, windings, half=10.0, wire=0.0):
     return readings
 
 
+@pytest.mark.parametrize("half", [0.9, 3.0, 9.0, 40.0])
+@pytest.mark.parametrize("wire", [0.0, 0.2])
+def test_six_leads_with_joined_commons_of_a_motor_of_few_ohms(half, wire):
+    found = find(measured(6, [(1, 2, 3), (4, 5, 6)], half, wire))
+    assert (found.kind, found.commons) == (Kind.UNIPOLAR_6_JOINED, (2, 5))
+
+
+@pytest.mark.parametrize(
+    ("shown", "ohms"),
+    [("OL", INFINITE), ("ol", INFINITE), ("open", INFINITE), ("0L", INFINITE), ("10k", 10_000), ("5ohm", 5),
+     ("5 ohms", 5),
+     ("1.2kohm", 1200), ("2M", 2e6), ("5\N{OHM SIGN}", 5), ("5", 5), ("1e3", 1000)],
+)  # fmt: skip
+def test_a_reading_is_written_as_the_meter_shows_it(shown, ohms):
+    from detent.cli.wiring import _ohms
+
+    assert _ohms(shown) == ohms
+
+
 @pytest.mark.parametrize("leads", list(permutations(range(1, 5)))[::5])
 def test_page_71_four_leads_low_readings_are_windings(leads):
     a, b, c, d = leads

@@ -30,13 +30,14 @@ def backup(
     port: str,
     file: Path,
     *,
+    force: bool = False,
     json: bool = False,
     unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:
     """Write everything that a unit keeps to a readable file.
 
     That is its programs, its parameters, its memory, as far as it tells. Nothing is changed in the unit. The file
-    is TOML; it is written whole or not at all.
+    is TOML; it is written whole or not at all. A file that is there is kept, and the backup gets a number: unit-2.toml.
 
     Parameters
     ----------
@@ -46,6 +47,8 @@ def backup(
         A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
     file
         The file to write, FILE.toml.
+    force
+        Write over a file that is there.
     json
         Print what was saved as JSON, too.
     unit
@@ -56,8 +59,11 @@ def backup(
 
     _keeps(model)
     with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
-        saved = _read(found, model, port)
+        saved = _read(found, model, port)._replace(options=unit.written())
+    wanted, file = file, file if force else _free(file)
     _write(file, saved)
+    if wanted != file:
+        print(f"detent: {wanted} is there and is kept; --force writes over it", file=sys.stderr)
     if json:
         print(json_text.dumps({"model": model, "port": port, "file": str(file), "saved": saved.saved}))
     else:
@@ -120,7 +126,7 @@ def restore(
     if not yes and input(f"Write {file} to the unit? [y/N] ").strip().lower() not in ("y", "yes"):
         failed("nothing was written")
     before = _before(model)
-    _write(before, there)
+    _write(before, there._replace(options=unit.written()))
     with progress(f"writing to the {model}") as watch, connected(model, port, unit, watch) as found:
         try:
             told = cast("Keeper", found).restore(wanted.saved)
@@ -130,9 +136,9 @@ def restore(
             print(f"detent: what the unit held before is in {before}", file=sys.stderr)
             raise
         except KeyboardInterrupt:
-            again = f"detent restore {model} {port}"
-            print(f"detent: interrupted: the unit may hold part of {file}; {again} {file} writes the rest, "
-                  f"{again} {before} what it held before", file=sys.stderr)  # fmt: skip
+            again, how = f"detent restore {model} {port}", unit.written()
+            print(f"detent: interrupted: the unit may hold part of {file}; {again} {file}{how} writes the rest, "
+                  f"{again} {before}{how} what it held before", file=sys.stderr)  # fmt: skip
             raise
     _tell(json, file, differences, told, before)
 
@@ -174,6 +180,15 @@ def _read(unit: "Blocking", model: str, port: str) -> "Backup":
     saved = cast("Keeper", unit).saved()
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
     return Backup(model, saved, f"What the {model} at {port} held on {when}.")
+
+
+def _free(file: Path) -> Path:
+    """`file`, or if something is there the first of file-2, file-3 and so on where nothing is."""
+    number, place = 1, file
+    while not place.is_dir() and (place.exists() or place.is_symlink()):
+        number += 1
+        place = file.with_name(f"{file.stem}-{number}{file.suffix}")
+    return place
 
 
 def _write(file: Path, saved: "Backup") -> None:

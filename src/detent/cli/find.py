@@ -63,7 +63,9 @@ def find(
     else:
         _print(found)
         if results and not found:
-            print("Nothing was found. Is it switched on, are TXD and RXD crossed, does it run a program?")
+            looked = ", ".join(search.port for search, _ in results)
+            print(f"Nothing was found at {looked}, looked at for {', '.join(families)}.")
+            print("Is it switched on, are TXD and RXD crossed, does it run a program?")
     if not found:
         raise SystemExit(FAILED)
 

@@ -82,6 +82,8 @@ def download(
     port: str,
     file: Path | None = None,
     *,
+    output: Path | None = None,
+    force: bool = False,
     json: bool = False,
     unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:
@@ -94,17 +96,26 @@ def download(
     port
         A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
     file
-        A file to write instead of the terminal; it is replaced whole or not at all.
+        A file to write instead of the terminal, whole or not at all.
+    output
+        The same, for who is used to options.
+    force
+        Write over a file that is there.
     json
         Print source and lines as one line of JSON.
     unit
         Which unit is meant, and its line.
     """
-    from detent.cli.target import failed
+    from detent.cli.target import asked_wrongly, failed
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
     from detent.outputs.files import write_whole
 
+    if file is not None and output is not None:
+        asked_wrongly(f"two files: {file} and --output {output}; say one")
+    file = output if file is None else file
+    if file is not None and file.exists() and not force:
+        asked_wrongly(f"{file} is there: write to another file, or over it with --force")
     language = _language(model)
     with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
         lines = _programmed(found).read_program()

@@ -1,6 +1,7 @@
 """The verb `send`: one exchange with a unit, real or emulated, from the command line."""
 
 import json as json_text
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from detent.cli import FAILED
@@ -9,13 +10,15 @@ from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
 if TYPE_CHECKING:
     from detent.hosts.typed import Said
 
+LONGEST_WAIT = 86_400.0  # seconds
+
 
 def send(
     model: str,
     port: str,
     *lines: str,
     raw: bool = False,
-    wait: float = 0.5,
+    wait: float | None = None,
     json: bool = False,
     unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:
@@ -37,7 +40,8 @@ def send(
     raw
         The lines are bytes, with escapes like \r and \x1b, and go out as they are.
     wait
-        With --raw: seconds in which answers are collected.
+        Seconds that a motion or a program may take that a line waits for (60). With --raw: in which answers are
+        collected (0.5).
     json
         Print one line of JSON.
     unit
@@ -45,31 +49,44 @@ def send(
     """
     from detent.cli.target import asked_wrongly
     from detent.cli.unit import unit as connected
+    from detent.hosts.typed import MOTION, say
     from detent.hosts.typed import raw as exchange
-    from detent.hosts.typed import say
 
     try:
         if not lines:
             raise ValueError("say what to send: detent send MODEL PORT LINE...")
-        if not wait >= 0:
-            raise ValueError(f"--wait {wait:g}: say 0 seconds or more")
+        if wait is not None and not 0 <= wait <= LONGEST_WAIT:
+            raise ValueError(f"--wait {wait:g}: say 0 seconds or more, a day at most")
         data = [unescaped(line) for line in lines] if raw else []
     except ValueError as error:
         asked_wrongly(error)
-    refused, told = False, []
+    refused = False
+    told: list[dict[str, object]] = []
     try:
         with connected(model, port, unit) as found:
             if raw:
                 for sent in data:
-                    came = found.perform(exchange(sent, wait))
+                    came = found.perform(exchange(sent, 0.5 if wait is None else wait))
                     told.append({"sent": escaped(sent), "received": escaped(came)})
                     if not json:
                         print(f"> {escaped(sent)}\n< {escaped(came)}", flush=True)
             else:
                 for line in lines:
-                    said = found.perform(say(found.driver, line))
+                    printed: list[str] = []
+                    _tell(found.port.receive(0.0).decode("latin-1").splitlines(), printed, json)
+                    said = found.perform(
+                        say(
+                            found.driver,
+                            line,
+                            MOTION if wait is None else wait,
+                            lambda text, printed=printed: _tell([text], printed, json),  # type: ignore[misc]
+                        )
+                    )
                     refused |= said.refused
-                    told.append({"sent": line, **said._asdict()})
+                    facts: dict[str, object] = {
+                        name: value for name, value in said._asdict().items() if value or name != "meanings"
+                    }
+                    told.append({"sent": line, **facts, **({"printed": printed} if printed else {})})
                     if not json:
                         print(f"> {line}\n{shown(said)}", flush=True)
     finally:  # what was said before something failed has been said, and may have moved something
@@ -79,9 +96,21 @@ def send(
         raise SystemExit(FAILED)
 
 
+def _tell(lines: Sequence[str], printed: list[str], json: bool) -> None:
+    """Show at once what a program prints, and keep it."""
+    for line in filter(None, map(str.strip, lines)):
+        printed.append(escaped(line.encode("latin-1")))
+        if not json:
+            print(f"| {printed[-1]}", flush=True)
+
+
 def shown(said: "Said") -> str:
     """What was said, a line each behind ``<``, and what it means."""
-    lines = [f"< {answer}" for answer in said.answers] or ["<"]
+    meanings = said.meanings or ("",) * len(said.answers)
+    lines = [
+        f"< {answer}" + (f"  ({meaning})" if meaning else "")
+        for answer, meaning in zip(said.answers, meanings, strict=True)
+    ] or ["<"]
     if said.meaning:
         lines[-1] += f"  ({said.meaning})"
     return "\n".join(lines)

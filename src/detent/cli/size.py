@@ -46,7 +46,7 @@ def size(page: str | None = None, values: Sequence[str] = (), /, *, json: bool =
     Parameters
     ----------
     page
-        A controller by name.
+        A page, like bs0610 or gs-c200-slew.
     values
         What is known, each NAME=VALUE.
     json
@@ -56,15 +56,19 @@ def size(page: str | None = None, values: Sequence[str] = (), /, *, json: bool =
     from detent.controllers.catalogue import unknown
 
     if page is None:
-        for name, found in PAGES.items():
-            print(f"{name:15}  {found.title}")
-        print(f"\nWhat it asks: detent size {next(iter(PAGES))}")
+        _list(PAGES, json)
         return
     if page not in PAGES:
-        asked_wrongly(unknown("page", page, tuple(PAGES)))
+        own = {name: found for name, found in PAGES.items() if name.startswith(f"{page.removesuffix('s')}-")}
+        if not own:
+            asked_wrongly(unknown("page", page, tuple(PAGES)))
+        if values:
+            asked_wrongly(f"the {page} has {len(own)} pages: {' and '.join(own)}; say which")
+        _list(own, json)
+        return
     chosen = PAGES[page]
     if not values:
-        _print_questions(page, chosen)
+        _print_questions(page, chosen, json)
         return
     try:
         given = _read(chosen, values)
@@ -81,7 +85,22 @@ def size(page: str | None = None, values: Sequence[str] = (), /, *, json: bool =
         print(f"  ! {warning}")
 
 
-def _print_questions(name: str, page: Page) -> None:
+def _list(pages: Mapping[str, Page], json: bool) -> None:
+    if json:
+        print(json_text.dumps({"pages": {name: page.title for name, page in pages.items()}}))
+        return
+    for name, found in pages.items():
+        print(f"{name:15}  {found.title}")
+    print(f"\nWhat it asks: detent size {next(iter(pages))}")
+
+
+def _print_questions(name: str, page: Page, json: bool) -> None:
+    if json:
+        asked = [
+            {"name": one.name, "takes": one.takes, "default": one.default, "help": one.help} for one in page.quantities
+        ]
+        print(json_text.dumps({"page": name, "title": page.title, "quantities": asked}))
+        return
     print(page.title)
     width = max(len(quantity.name) for quantity in page.quantities)
     for quantity in page.quantities:
@@ -111,18 +130,24 @@ def _read(page: Page, values: Sequence[str]) -> dict[str, Any]:
             raise ValueError(f"{name} is missing: {quantity.help}, {quantity.takes}")
         try:
             read[name] = quantity.read(text)
+        except OutOfRange as error:
+            raise ValueError(f"{name}={text}: {quantity.help}, {quantity.takes}: it takes {error}") from None
         except ValueError:
             raise ValueError(f"{name} cannot be {text!r}; it takes {quantity.takes}") from None
     return read
 
 
-def number_with(unit: str) -> Callable[[str], float]:
-    """A reader of plain numbers that may carry their unit."""
+class OutOfRange(ValueError):
+    """A number that is read, and that no answer can be made of."""
+
+
+def number_with(unit: str, *, above: bool = False) -> Callable[[str], float]:
+    """A reader of plain numbers that may carry their unit; 0 is one unless they are to be `above` it."""
 
     def read(text: str) -> float:
         value = float(text.strip().removesuffix(unit))
-        if not 0 <= value < 1e9:
-            raise ValueError(text)
+        if not 0 <= value < 1e9 or (above and not value):
+            raise OutOfRange(f"a number {'above 0' if above else 'of 0 or more'} and below 1e9")
         return value
 
     return read
@@ -145,7 +170,9 @@ def _genstepper(given: Mapping[str, Any]) -> Answer:
 
     values = dict(given)
     current = values.pop("current")
-    if current is not None and values["voltage"] is None:
+    if current is not None and values["voltage"] is not None:
+        raise ValueError("say voltage or current, not both: a winding takes the voltage through its resistance")
+    if current is not None:
         values["voltage"] = voltage_for(current, values["resistance"])
     if values["voltage"] is None:
         raise ValueError("voltage is missing: of the motor supply, or current=A to have it computed")
@@ -175,12 +202,20 @@ def _genstepper(given: Mapping[str, Any]) -> Answer:
 
 
 def _gsc200_current(given: Mapping[str, Any]) -> Answer:
-    from detent.controllers.gsc200.application import CONFLICT, resistors
+    from detent.controllers.gsc200.application import CONFLICT, Resistors, currents, resistors, standard
 
-    found = resistors(given["rest"], given["slew"], given["ramp"], given["drive"])
+    drive = given["drive"]
+    found = resistors(given["rest"], given["slew"], given["ramp"], drive)
+    bought = Resistors(*map(standard, found))
+    made = dict(zip(("rest", "slew", "ramp"), currents(bought, drive), strict=True))
     meaning = {"r1": "to 5 V by Tr1, while ramping", "r2": "to ground by Tr2, at rest", "r3": "to ground, always"}
     lines = [Line(f"{name.upper()} ({what})", f"{getattr(found, name):.0f} ohm") for name, what in meaning.items()]
-    return Answer(lines, {f"{name}_ohm": getattr(found, name) for name in meaning}, [CONFLICT])
+    lines.append(Line("with the nearest of E24", " and ".join(f"{ohms:g}" for ohms in bought) + " ohm: "
+                      + ", ".join(f"{name} {amps:.3g} A" for name, amps in made.items())))  # fmt: skip
+    facts = {f"{name}_ohm": getattr(found, name) for name in meaning}
+    facts["e24"] = {**{f"{name}_ohm": getattr(bought, name) for name in meaning},
+                    **{f"{name}_a": amps for name, amps in made.items()}}  # fmt: skip
+    return Answer(lines, facts, [CONFLICT] if drive == "GS-D200S" else [])
 
 
 def _gsc200_slew(given: Mapping[str, Any]) -> Answer:
@@ -188,7 +223,12 @@ def _gsc200_slew(given: Mapping[str, Any]) -> Answer:
 
     turns = slew_rate(given["force"], given["length"], given["time"], given["torque"])
     rate = turns / 60 * given["steps"]
-    lines = [Line("speed", f"{turns:.4g} turns/min"), Line("slew rate", f"{rate:.4g} steps/s: T{round(rate / 10)}")]
+    if rate < 5:
+        raise ValueError(f"the load needs {rate:.3g} steps/s: T begins at 10 steps/s (T1); take a gear, or more steps")
+    lines = [
+        Line("speed", f"{turns:.4g} turns/min"),
+        Line("slew rate", f"{rate:.4g} steps/s: T{min(max(round(rate / 10), 1), 1000)}"),
+    ]
     warnings = [SLEW_CONFLICT]
     if rate > 10_000:
         warnings.append("the module gives at most 10 000 steps/s")
@@ -228,6 +268,12 @@ def _maybe(read: Callable[[str], Any]) -> Callable[[str], Any]:
     return lambda text: read(text) if text else None
 
 
+def _steps(text: str) -> int:
+    if int(text) < 1:
+        raise ValueError(text)
+    return int(text)
+
+
 _YES_NO = one_of(yes=True, no=False)
 _BOARD = (
     Quantity("resistance", number_with("ohm"), "ohm", None, "of one winding"),
@@ -253,11 +299,11 @@ _CURRENTS = (
     ),
 )
 _SLEW = (
-    Quantity("force", number_with("lb"), "lb", None, "to be overcome"),
-    Quantity("length", number_with("in"), "inches", None, "to be moved"),
-    Quantity("time", number_with("s"), "s", None, "for it"),
-    Quantity("torque", number_with("ozin"), "oz in", None, "of the motor at that speed"),
-    Quantity("steps", int, "a whole number", "200", "steps in a turn"),
+    Quantity("force", number_with("lb", above=True), "lb", None, "to be overcome"),
+    Quantity("length", number_with("in", above=True), "inches", None, "to be moved"),
+    Quantity("time", number_with("s", above=True), "s", None, "for it"),
+    Quantity("torque", number_with("ozin", above=True), "oz in", None, "of the motor at that speed"),
+    Quantity("steps", _steps, "a whole number of 1 or more", "200", "steps in a turn"),
 )
 
 _CHOPPER = (

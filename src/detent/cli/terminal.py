@@ -84,23 +84,30 @@ def terminal(
 def _exchange(unit: "Blocking", line: str, json: bool) -> bool:
     """Say one line and print what comes of it. Whether it was taken."""
     from detent.hosts.errors import DriverError
-    from detent.hosts.typed import say
+    from detent.hosts.typed import MOTION, say
 
     try:
         unasked = unit.port.receive(0.0)
-        said = unit.perform(say(unit.driver, line))
+        printed: list[str] = []
+
+        def heard(text: str) -> None:
+            printed.append(text)
+            if not json:
+                print(f"| {text}", flush=True)
+
+        said = unit.perform(say(unit.driver, line, MOTION, heard))
     except (DriverError, ValueError, OSError) as error:
         if json:
             print(json_text.dumps({"sent": line, "error": str(error)}), flush=True)
         else:
-            print(f"! {error}", flush=True)
+            print(f"! {getattr(error, 'told', error)}", flush=True)
         return False
     except KeyboardInterrupt:
         unit.driver.forget()  # half an exchange is under way
         print("! not waited for any longer", file=sys.stderr)
         return False
     if json:
-        facts = {"sent": line, **said._asdict(), "unasked": escaped(unasked)}
+        facts = {"sent": line, **said._asdict(), "printed": printed, "unasked": escaped(unasked)}
         print(json_text.dumps(facts), flush=True)
     else:
         if unasked:

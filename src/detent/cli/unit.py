@@ -1,5 +1,6 @@
 """The unit that a host-side verb talks to: its options on the command line, its connection, how far it is."""
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
@@ -9,6 +10,7 @@ from cyclopts import Parameter
 
 if TYPE_CHECKING:
     from detent.hosts import exchange
+    from detent.hosts.errors import DriverError
     from detent.hosts.exchange import Blocking, Watch
 
 
@@ -78,6 +80,16 @@ class UnitOptions:
             chosen["mode"] = "party"  # in single mode an axis needs no name
         return chosen
 
+    def written(self) -> str:
+        """The options that differ from the model's, as they are typed behind a command."""
+        chosen = {field.name: value for field in fields(self) if (value := getattr(self, field.name)) is not None}
+        given = [
+            f"--{name.replace('_', '-')}" + ("" if value is True else f" {shlex.quote(str(value))}")
+            for name, value in chosen.items()
+            if value is not False
+        ]
+        return "".join(f" {option}" for option in given)
+
 
 NO_UNIT_OPTIONS = UnitOptions()
 
@@ -108,9 +120,24 @@ def unit(model: str, port: str, options: UnitOptions, watch: "Watch | None" = No
         try:
             yield connected
         except DriverError as error:
-            failed(error)
+            failed(error.told + _another(error, port))
         except ValueError as error:
             asked_wrongly(error)
+
+
+def _another(error: "DriverError", port: str) -> str:
+    """What may be there in the unit's place, where nothing that it says was heard."""
+    from detent.hosts.errors import BadAnswer, NoAnswer
+
+    if not isinstance(error, BadAnswer | NoAnswer) or (error.spoken is not None and error.spoken.echoed):
+        return ""
+    came = b"" if error.spoken is None else error.spoken.received
+    likely = ""
+    if came.rstrip().endswith(b"*") or b"GenStepper" in came:
+        likely = " (what came reads like a GenStepper board, bs0610)"
+    elif b"AMS" in came or b"SMC-27" in came or came.endswith((b"#\r\n", b"#\n")):
+        likely = " (what came reads like a DCB-274)"
+    return f"; is another controller there, or another rate{likely}? See: detent find {port}"
 
 
 @contextmanager

@@ -24,8 +24,8 @@ def wiring(readings: Sequence[str] = (), /, *, motor: str | None = None, json: b
     Parameters
     ----------
     readings
-        LEAD-LEAD=OHMS, or LEAD-LEAD=open, for all pairs of 4, 5 or 6 leads. Without any: the orders for
-        leads A, B, C, D.
+        LEAD-LEAD=OHMS as the meter shows it (10, 5ohm, 1.2k), or LEAD-LEAD=open (or OL), for all pairs of 4, 5 or 6
+        leads. Without any: the orders for leads A, B, C, D.
     motor
         Instead: the wiring of a motor in the manual's examples, by its catalogue number.
     json
@@ -54,13 +54,25 @@ def _reading(text: str) -> tuple[tuple[int, int], float]:
     pair, equals, value = text.partition("=")
     one, dash, other = pair.partition("-")
     try:
-        ohms = math.inf if value.strip().lower() in ("open", "inf") else float(value)
+        ohms = _ohms(value)
         leads = int(one), int(other)
     except ValueError:
         dash = ""
     if not (equals and dash):
         raise ValueError(f"{text!r} is no reading: write LEAD-LEAD=OHMS, like 1-2=10 or 1-3=open")
     return (min(leads), max(leads)), ohms
+
+
+def _ohms(text: str) -> float:
+    """What a meter shows: ohms, with k or M and a unit if one likes; OL for a circuit that is open. ValueError."""
+    shown = text.strip().lower()
+    if shown in ("open", "inf", "ol", "0l", "o.l", "0.l", "o.l.", "over"):
+        return math.inf
+    for unit in ("ohms", "ohm", "\N{GREEK SMALL LETTER OMEGA}", "r"):
+        shown = shown.removesuffix(unit)
+    shown = shown.strip()
+    scale = {"k": 1e3, "m": 1e6}.get(shown[-1:], 1.0)  # nobody's meter shows a winding in milliohms with one letter
+    return scale * float(shown[:-1] if scale != 1.0 else shown)
 
 
 def _print_windings(found: "Found | None", json: bool) -> None:

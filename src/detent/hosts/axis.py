@@ -109,9 +109,10 @@ class Axis(Driver):
 
         Raises MotionFailed.
         """
-        waited = 0.0
+        waited, began = 0.0, None
         while (yield from self.moving()):
             if timeout is not None and waited >= timeout:
                 raise MotionFailed(self.title, f"still moves after {timeout:g} s")
-            yield Rest(self.poll)
-            waited += self.poll
+            now = (yield Rest(self.poll)).at
+            began = now - self.poll if began is None else began
+            waited = max(waited + self.poll, now - began)  # questions take their time, too

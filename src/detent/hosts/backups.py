@@ -20,16 +20,17 @@ class BackupError(ValueError):
 
 
 class Backup(NamedTuple):
-    """What `saved` returned, of a unit of `model`; `note` says when and where."""
+    """What `saved` returned, of a unit of `model`; `note` says when and where, `options` how to reach it again."""
 
     model: str
     saved: Mapping[str, Any]
     note: str = ""
+    options: str = ""
 
     def text(self, explain: Explain = lambda line: "") -> str:
         """The file. Lines of programs have what `explain` says of them behind."""
         lines = [f"# {self.note}"] if self.note else []
-        lines.append(f"# Back into the unit: detent restore {self.model} PORT FILE")
+        lines.append(f"# Back into the unit: detent restore {self.model} PORT FILE{self.options}")
         if not isinstance(self.saved.get(MEMORY, ""), str):
             lines.append("# What is written back is memory, bytes with their addresses; the rest is there to be read.")
         lines += [

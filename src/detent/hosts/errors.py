@@ -10,7 +10,7 @@
   - ``PortLost`` (a ConnectionError): the port went away; the next call opens it again
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 
 class Spoken(NamedTuple):
@@ -20,16 +20,26 @@ class Spoken(NamedTuple):
     received: bytes
 
     def __str__(self) -> str:
-        """Both as people read bytes: printable ones as they are, the rest escaped."""
+        """Both as people read bytes: printable ones as they are, the rest escaped; of much only the ends."""
         return f"sent {_shown(self.sent)}, received {_shown(self.received) if self.received else 'nothing'}"
+
+    @property
+    def echoed(self) -> bool:
+        """Whether what came is what was sent: a looped line, or an adapter that echoes."""
+        return self.sent != b"" and self.received == self.sent
 
 
 class DriverError(RuntimeError):
-    """A device or a line does not do what its manual says. `spoken` is the exchange, if there was one."""
+    """A device or a line does not do what its manual says. `spoken` is the exchange, if there was one.
 
-    def __init__(self, unit: str, what: str, spoken: Spoken | None = None) -> None:
-        super().__init__(f"{unit}: {what}" + (f" ({spoken})" if spoken is not None else ""))
-        self.unit, self.what, self.spoken = unit, what, spoken
+    `advice` says which call helps; `told` is the error without it, for whoever does not call from Python.
+    """
+
+    def __init__(self, unit: str, what: str, spoken: Spoken | None = None, advice: str = "") -> None:
+        exchange = f" ({spoken})" if spoken is not None else ""
+        super().__init__(f"{unit}: {what}" + (f": {advice}" if advice else "") + exchange)
+        self.unit, self.what, self.spoken, self.advice = unit, what, spoken, advice
+        self.told = f"{unit}: {what}{exchange}"
 
 
 class NoAnswer(DriverError, TimeoutError):
@@ -43,8 +53,8 @@ class BadAnswer(DriverError):
 class Refused(DriverError):
     """The device says no. `code` is what it answered, as the manual names it: ``E2``, ``#``."""
 
-    def __init__(self, unit: str, what: str, spoken: Spoken | None = None, code: str = "") -> None:
-        super().__init__(unit, what, spoken)
+    def __init__(self, unit: str, what: str, spoken: Spoken | None = None, code: str = "", advice: str = "") -> None:
+        super().__init__(unit, what, spoken, advice)
         self.code = code
 
 
@@ -60,5 +70,13 @@ class PortLost(DriverError, ConnectionError):
     """The port went away."""
 
 
+ECHOES: Final = "sends back what it is sent: the line is looped or crossed, or an adapter echoes; nobody answered"
+
+SHOWN: Final = 120
+"""How many bytes of an exchange an error shows; of more, the first and the last of them."""
+
+
 def _shown(data: bytes) -> str:
-    return repr(data)[1:]
+    if len(data) <= SHOWN:
+        return repr(data)[1:]
+    return f"{repr(data[: SHOWN // 2])[1:]} ... {repr(data[-SHOWN // 4 :])[1:]}, {len(data)} bytes"

@@ -15,19 +15,24 @@ lives in the virtual time of a cell.
 from collections.abc import Callable, Coroutine, Generator
 from contextlib import AbstractAsyncContextManager, AbstractContextManager, AsyncExitStack, ExitStack, closing
 from functools import partial, update_wrapper
-from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeAlias, TypeVar, overload
+from typing import Any, Concatenate, Final, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeAlias, TypeVar, overload
 
-from detent.hosts.errors import DriverError, NoAnswer, PortLost, Spoken
+from detent.hosts.errors import ECHOES, BadAnswer, DriverError, NoAnswer, PortLost, Spoken
 
 T = TypeVar("T")
 P = ParamSpec("P")
+
+
+LONGEST_ANSWER: Final = 65_536
+"""Bytes that are read for one answer, and dropped by one `Clear`: a line that says more than that babbles."""
 
 
 class Ask(NamedTuple):
     """Send `data`, then read until `complete` says that an answer is there, for `timeout` seconds at most.
 
     `complete` is given everything that has come and returns how many bytes of it are the answer, None while it is
-    not whole; what lies behind the answer is kept for the next one. Without `complete` nothing is read.
+    not whole; what lies behind the answer is kept for the next one. Without `complete` nothing is read. No answer
+    is longer than `LONGEST_ANSWER`: who sends more than that is not listened to any further.
     """
 
     data: bytes
@@ -48,7 +53,7 @@ class Rest(NamedTuple):
 
 
 class Clear(NamedTuple):
-    """Forget what has come and was not read."""
+    """Forget what has come and was not read, `LONGEST_ANSWER` bytes of it at most."""
 
 
 class Progress(NamedTuple):
@@ -62,7 +67,8 @@ class Progress(NamedTuple):
 class Answer(NamedTuple):
     """What came: the answer to an `Ask`, or, if it is not `whole`, everything that came in its time.
 
-    `at` is when an `Ask` that reads was done, in seconds by the clock of the port: only differences count.
+    `at` is when an `Ask` that reads, a `Pause` or a `Rest` was done, in seconds by the clock of the port: only
+    differences count.
     """
 
     data: bytes = b""
@@ -111,6 +117,8 @@ class Driver:
         """The whole answer to `data`. Raises NoAnswer."""
         answer = yield Ask(data, complete, timeout)
         if not answer.whole:
+            if len(data) > 1 and answer.data == data:
+                raise BadAnswer(self.title, ECHOES, Spoken(data, answer.data))
             what = "does not answer" if not answer.data else "does not finish its answer"
             raise NoAnswer(self.title, f"{what} within {timeout:g} s", Spoken(data, answer.data))
         return answer.data
@@ -234,9 +242,11 @@ class Blocking(_Shell):
                 return NOTHING if complete is None else self._read(complete, timeout)
             case Pause(seconds) | Rest(seconds):
                 self.port.wait(seconds)
+                return Answer(at=self.port.clock())
             case Clear():
-                while self.port.receive(0.0):
-                    pass
+                left = LONGEST_ANSWER
+                while left > 0 and (dropped := self.port.receive(0.0)):
+                    left -= len(dropped)
             case Progress():
                 if self.watch is not None:
                     self.watch(step)
@@ -250,6 +260,8 @@ class Blocking(_Shell):
             if not more:
                 break
             came += more
+            if len(came) > LONGEST_ANSWER:
+                break
             count = complete(came)
             if count is not None:
                 port.keep(came[count:])
@@ -307,9 +319,11 @@ class Asynchronous(_Shell):
                 return NOTHING if complete is None else await self._read(complete, timeout)
             case Pause(seconds) | Rest(seconds):
                 await self.port.wait(seconds)
+                return Answer(at=self.port.clock())
             case Clear():
-                while await self.port.receive(0.0):
-                    pass
+                left = LONGEST_ANSWER
+                while left > 0 and (dropped := await self.port.receive(0.0)):
+                    left -= len(dropped)
             case Progress():
                 if self.watch is not None:
                     self.watch(step)
@@ -323,6 +337,8 @@ class Asynchronous(_Shell):
             if not more:
                 break
             came += more
+            if len(came) > LONGEST_ANSWER:
+                break
             count = complete(came)
             if count is not None:
                 port.keep(came[count:])

@@ -13,7 +13,7 @@ Filling the gap with bytes instead would not do: whatever they are, they could b
 
 from typing import Final, NamedTuple
 
-from detent.hosts.errors import BadAnswer, Busy, NoAnswer, Spoken
+from detent.hosts.errors import ECHOES, BadAnswer, Busy, NoAnswer, Spoken
 from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps, length
 from detent.hosts.interpolation import LARGEST_SPEED, UNIT
 
@@ -87,6 +87,12 @@ class BusDriver(Driver):
         for left in reversed(range(TRIES)):
             yield Clear()
             answer = yield Ask(data, length(ANSWER), self._patience)
+            echoed = answer.data[: len(data)] == data
+            if echoed and answer.whole:  # steps and a flag that read so, or an echo before the answer
+                echoed = (yield Ask(b"", length(len(data)), self._patience)).whole
+            if echoed:
+                self._in_step = False
+                raise BadAnswer(f"drive {drive}", ECHOES, Spoken(data, answer.data))
             if answer.whole and not answer.data[2] & NO_FLAG:
                 self._at = answer.at
                 return Report(int.from_bytes(answer.data[:2], "big"), answer.data[2])
@@ -103,7 +109,7 @@ class BusDriver(Driver):
         """Status of a drive that is to move: it is at rest, and in step. Raises Busy."""
         report = yield from self._status(drive)
         if report.moving:
-            raise Busy(f"drive {drive}", "moves: wait() for its end, or stop() it")
+            raise Busy(f"drive {drive}", "moves", advice="wait() for its end, or stop() it")
         return report
 
     def _stopped(self, drive: int, code: int) -> Steps[None]:
@@ -124,6 +130,8 @@ class BusDriver(Driver):
             self._in_step = False
             if left:
                 yield from self._silent()
+        if answer.data == message(drive, STATUS):
+            raise BadAnswer(f"drive {drive}", f"{ECHOES}; it may still move", Spoken(answer.data, answer.data))
         what = f"does not answer: it was told to stop {STOPS} times and may still move"
         raise NoAnswer(f"drive {drive}", what, Spoken(data, answer.data))
 

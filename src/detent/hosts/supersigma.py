@@ -112,7 +112,7 @@ class Supersigma(Axis, BusDriver):
         self._originating, self._wanted = False, abs(steps)
 
     def _busy(self) -> Busy:
-        return Busy(self.title, "moves: wait() for its end, or stop() it")
+        return Busy(self.title, "moves", advice="wait() for its end, or stop() it")
 
     def _place(self, report: Report) -> int:
         """Where the drive is. While it looks for its origin it is backward of where it began: its steps say no more."""

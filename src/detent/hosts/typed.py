@@ -5,13 +5,15 @@ answered comes back as it was said, with its meaning where the manual gives one.
 """
 
 import re
+from collections.abc import Callable
 from functools import singledispatch
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 from detent.hosts.dcb274 import Dcb274
-from detent.hosts.errors import BadAnswer, Refused, Spoken
-from detent.hosts.exchange import Ask, Clear, Driver, Steps
-from detent.hosts.genstepper import GenStepper
+from detent.hosts.errors import BadAnswer, MotionFailed, NoAnswer, Refused, Spoken
+from detent.hosts.exchange import Ask, Clear, Driver, Rest, Steps
+from detent.hosts.genstepper import Action, GenStepper, Reports
+from detent.hosts.genstepper.commands import RESET_SECONDS, STEP_MODES
 from detent.hosts.gsc200 import GsC200
 from detent.hosts.gsc200.commands import EEPROM_SECONDS
 from detent.hosts.gsc200.dialogue import ERRORS, Again
@@ -19,22 +21,38 @@ from detent.hosts.interpolation import UNIT
 from detent.hosts.microbus import Report
 from detent.hosts.supersigma import LOW, Supersigma
 
-FOR_EVER: Final = 86_400.0  # seconds: as long as the motion takes that is waited for
+MOTION: Final = 60.0  # seconds that a motion may take that is waited for, unless the caller says more
 ANYTHING: Final = re.compile(r"(?s).+")
 SLOWEST_FRAME: Final = 12 * 11 / 110  # seconds: the longest answer of a GS-C200 at 110 baud
 
 
 class Said(NamedTuple):
-    """The lines that were answered, as they came; what they mean; whether the unit said no."""
+    """The lines that were answered, as they came; what they mean; whether the unit said no, or ignored a command.
+
+    `meanings` are those of single lines of `answers`, "" for one without, or nothing.
+    """
 
     answers: tuple[str, ...]
     meaning: str = ""
     refused: bool = False
+    meanings: tuple[str, ...] = ()
+
+
+Heard: TypeAlias = Callable[[str], object]
+"""Is given each line that a unit prints while something is waited for, as it comes."""
+
+
+def unheard(line: str) -> None:
+    """Nobody looks at what is printed meanwhile."""
 
 
 @singledispatch
-def say(driver: Driver, line: str) -> Steps[Said]:
-    """Say one line to the unit of `driver`; what it said. Raises DriverError, and ValueError for what is no line."""
+def say(driver: Driver, line: str, seconds: float = MOTION, heard: Heard = unheard) -> Steps[Said]:
+    """Say one line to the unit of `driver`; what it said. Raises DriverError, and ValueError for what is no line.
+
+    What the line waits for, the end of a motion or of a program, may take so many `seconds`; lines that a program
+    prints meanwhile go to `heard`.
+    """
     raise NotImplementedError(f"nobody knows how a line is typed to {driver.title}")
     yield
 
@@ -50,7 +68,7 @@ def raw(data: bytes, seconds: float) -> Steps[bytes]:
 
 
 @say.register
-def _(driver: GsC200, line: str) -> Steps[Said]:
+def _(driver: GsC200, line: str, seconds: float = MOTION, heard: Heard = unheard) -> Steps[Said]:
     line = line.strip()
     if not line or not line.isascii() or not line.isprintable():
         raise ValueError(f"{line!r} is no command line: type a command like F, V1 or +100")
@@ -85,36 +103,92 @@ _WORDS: Final = {"Y": "done, stored or begun", "B": "busy: a program, a command 
 
 
 @say.register
-def _(driver: GenStepper, line: str) -> Steps[Said]:
-    """Command by command, each when the prompt of the last has come: a new character drops what was not sent yet."""
+def _(driver: GenStepper, line: str, seconds: float = MOTION, heard: Heard = unheard) -> Steps[Said]:
+    """Command by command, each when the prompt of the last has come: a new character drops what was not sent yet.
+
+    A board answers what it does not know as it answers what it does: commands that it ignores are told from the
+    manual (pages 22 to 44).
+    """
     if not line.strip() or not line.isascii() or not line.isprintable():
         raise ValueError(f"{line!r} is no command line: type commands like -1? or X1000GI")
     answers: list[str] = []
+    ignored: list[str] = []
+    value = 0  # of the last number, which all commands behind it have (page 24)
     for command in re.findall(r"[-+\d]*[^-+\d]|[-+\d]+$", line.rstrip()):
         if command[-1] in "+-0123456789":
             command += " "  # a number alone is not answered; space is a command without an effect
-        more = FOR_EVER if command[-1] in "Ii" else 0.0
-        found = yield from driver.exchange(command, re.compile(rb"(?s)(.*?)\*"), more=more)
+        number = re.match(r"[-+]?\d+", command)
+        value = int(number[0]) if number else value
+        ignored += _ignored(command, value)
+        more = seconds if command[-1] in "Ii" else RESET_SECONDS if command[-1] == "!" else 0.0
+        try:
+            found = yield from driver.exchange(command, re.compile(rb"(?s)(.*?)\*"), more=more)
+        except NoAnswer:
+            if command[-1] in "Ii":
+                raise MotionFailed(driver.title, f"does not say within {seconds:g} s that it is idle") from None
+            raise
         answers += [text for one in found[1].decode("latin-1").split("\n") if (text := one.strip())]
-    return Said((*answers, "*"), "" if answers else "done")
+    meanings = tuple(_reported(answer) for answer in answers)
+    what = "; ".join(ignored) or ("" if answers else "done")
+    return Said((*answers, "*"), what, bool(ignored), (*meanings, ""))
+
+
+def _ignored(command: str, value: int) -> list[str]:
+    """What the board does not do of a command with the VALUE that it has, in words."""
+    letter = command[-1].upper()
+    if letter in " ,":
+        return []
+    if letter not in _LETTERS:
+        return [f"ignored: {command[-1]} is no command"]
+    if letter in _TAKES and value not in _TAKES[letter]:
+        numbers = _TAKES[letter]
+        return [f"ignored: {letter} takes {numbers[0]} to {numbers[-1]}, not {value}"]
+    return []
+
+
+_LETTERS: Final = "ABEGHIKLMOPRSTVWXYZ!=?"
+_TAKES: Final = {"H": range(2), "M": range(2), "O": STEP_MODES, "W": range(3)}  # pages 28, 30, 36
+
+
+def _reported(text: str) -> str:
+    """What a line of a report says: ``X,-2,132`` is the speed of X (pages 39 to 43)."""
+    found = re.fullmatch(r"([XY]),(-?\d+),([-\d,]+)", text)
+    if found is None:
+        return ""
+    motor, number, values = found[1], int(found[2]), found[3].split(",")
+    names = [name.replace("_", " ") for name in Reports._fields]
+    if number == 0 and len(values) == len(names):
+        told = zip(names, values, strict=True)
+    elif -len(names) <= number < 0 and len(values) == 1:
+        told = zip([names[-number - 1]], values, strict=True)
+    else:
+        return ""
+    return f"{motor}: " + ", ".join(f"{name} {_action(value) if name == 'action' else value}" for name, value in told)
+
+
+def _action(value: str) -> str:
+    try:
+        return Action(int(value)).name.lower().replace("_", " ")
+    except ValueError:
+        return value
 
 
 # -- DCB-274 ---------------------------------------------------------------------------------------------------
 
 
 @say.register
-def _(driver: Dcb274, line: str) -> Steps[Said]:
+def _(driver: Dcb274, line: str, seconds: float = MOTION, heard: Heard = unheard) -> Steps[Said]:
     """A line; ESC, ^C, ^P and ^N NAME in letters stand for the single characters. Q of single mode reads on."""
     text = line.strip()
     if not text.isascii() or not text.isprintable():
         raise ValueError(f"{line!r} is no command line: type a command like X or +1000, or ESC, ^C, ^P, ^N NAME")
     try:
-        return (yield from _dcb274(driver, text))
+        return (yield from _dcb274(driver, text, seconds, heard))
     except Refused as error:
         return Said((error.code,), error.what, refused=True)
 
 
-def _dcb274(driver: Dcb274, text: str) -> Steps[Said]:
+def _dcb274(driver: Dcb274, text: str, seconds: float, heard: Heard) -> Steps[Said]:
     if text.upper() in _SINGLE:
         what, meaning = _SINGLE[text.upper()]
         yield from getattr(driver, what)()
@@ -126,8 +200,27 @@ def _dcb274(driver: Dcb274, text: str) -> Steps[Said]:
     if listing and driver.mode == "single":
         found = yield from driver.listing(int(listing[1] or 0))
         return Said((*map(str, found.lines), str(found.end)), "" if found.lines else "no program there")
-    answer = yield from driver.command(text, FOR_EVER)
+    if driver.mode == "single" and (traced := re.fullmatch(r"G ?(\d*) 1", text)):
+        yield from driver.trace(int(traced[1] or 0), 0.0)
+        ended = yield from _listen(driver, seconds, heard)
+        return Said((), "the program has ended" if ended else "the program still runs; ESC ends it, @ slows down")
+    answer = yield from driver.command(text, seconds)
     return Said((answer,) if answer.strip() else (), "" if answer.strip() else "done")
+
+
+def _listen(driver: Dcb274, seconds: float, heard: Heard) -> Steps[bool]:
+    """Pass on what the program prints as it comes, for so many seconds at most; whether it has ended."""
+    began = None
+    while True:
+        running = yield from driver.moving()
+        for line in driver.printed():
+            heard(line)
+        if not running:
+            return True
+        now = (yield Rest(driver.poll)).at
+        began = now if began is None else began
+        if now - began > seconds:
+            return False
 
 
 _SINGLE: Final = {
@@ -142,7 +235,7 @@ _SINGLE: Final = {
 
 
 @say.register
-def _(driver: Supersigma, line: str) -> Steps[Said]:
+def _(driver: Supersigma, line: str, seconds: float = MOTION, heard: Heard = unheard) -> Steps[Said]:
     """The words of docs/controllers/supersigma.md; speeds are in units of 100 half steps/s, as on the bus."""
     words = line.split()
     match words[:1], [_whole(word) for word in words[1:]]:

@@ -119,5 +119,10 @@ def _warnings(question: Question, winding: float) -> Iterator[str]:
         yield "do not take more than 500 mA from the board's 5 V (page 65)"
     elif question.tap > TAP_FAN_CURRENT:
         yield "more than 100 mA from the board's 5 V: the board must be fan cooled (page 65)"
+    if question.half_power:
+        yield (
+            "above A, at first 3072 microsteps/s, both windings are at full power whatever H says: 0A or a run rate "
+            "below it (page 24), or a supply for full power"
+        )
     if question.mode == 3:
         yield EXAMPLE

@@ -116,14 +116,15 @@ def _five(ohms: Reading) -> Found:
 
 
 def _six(ohms: Reading) -> Found:
-    near_zero = [pair for pair, reading in ohms.items() if reading < JOINED]
-    measured = [reading for pair, reading in ohms.items() if pair not in near_zero and reading <= OPEN]
-    if len(near_zero) == 1 and len(measured) == 14:
-        commons = near_zero[0]
+    commons = min(ohms, key=lambda pair: ohms[pair])
+    # of a motor of few ohms the halves are near zero as well: the common leads are those that read least
+    if ohms[commons] < JOINED and max(ohms.values()) <= OPEN:
         ends = tuple(lead for lead in range(1, 7) if lead not in commons)
         halves = [reading for pair, reading in ohms.items() if pair != commons and set(pair) & set(commons)]
         wholes = [reading for pair, reading in ohms.items() if not set(pair) & set(commons)]
-        if _alike(halves) and _alike(wholes) and _about(sum(wholes) / len(wholes), 2 * sum(halves) / len(halves)):
+        half, whole = sum(halves) / len(halves), sum(wholes) / len(wholes)
+        fits = ohms[commons] <= half / 2 and _about(whole, 2 * half)
+        if _alike(halves) and _alike(wholes) and fits:
             return Found(Kind.UNIPOLAR_6_JOINED, (), commons, ends,
                          "it needs the unipolar wiring; resistances cannot tell winding A from B")  # fmt: skip
     connected = {pair: reading for pair, reading in ohms.items() if reading <= OPEN}

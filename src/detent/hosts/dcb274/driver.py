@@ -103,14 +103,16 @@ class Dcb274(Memory):
         """Wait until the axis stands and no program runs.
 
         Raises MotionFailed after `timeout` seconds, if an index ended elsewhere than it should, or if a limit switch
-        ended a search for home. The unit itself does not tell: an index cut by a limit counts as complete.
+        ended a search for home. The unit itself does not tell: an index cut by a limit counts as complete. A stop by
+        another thread ends the wait and is no failure.
         """
         yield from super().wait(timeout)
         target, search = self._target, self._search
         self._leave(None)
+        told = self._times_told
         if target is not None:
             position = yield from self.position()
-            if position != target:
+            if position != target and self._times_told == told:
                 met = yield from self.limits()
                 why = "limit A is met" if met.high else "limit B is met" if met.low else "was it stopped otherwise?"
                 raise MotionFailed(self.title, f"stands at {position}, not at {target}: {why}")

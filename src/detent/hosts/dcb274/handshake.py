@@ -9,7 +9,7 @@ before the line is complete: the line is taken back and entered again, so nobody
 import re
 from typing import Final
 
-from detent.hosts.errors import BadAnswer, NoAnswer, Refused, Spoken
+from detent.hosts.errors import ECHOES, BadAnswer, NoAnswer, Refused, Spoken
 from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps, length, until
 
 BS, LF, CR, SPACE, ESC = b"\x08", b"\n", b"\r", b" ", b"\x1b"
@@ -118,8 +118,8 @@ class SingleMode(Handshake):
         yield Clear()
         answer = yield Ask(SPACE, until(b"\r\n"), self.patience)
         if not answer.data:
-            what = "does not answer SPACE: it runs a program (abort() ends that), is on a party line, or is off"
-            raise NoAnswer(self.title, what, Spoken(SPACE, b""))
+            what = "does not answer SPACE: it runs a program, which ESC ends, is on a party line, or is off"
+            raise NoAnswer(self.title, what, Spoken(SPACE, b""), "abort() sends ESC")
         version = re.search(rb"V\d+\.\d+", answer.data)
         if version is not None and self._typed:
             # It was reset while a line was typed, and has taken a character of that for its name (page 23).
@@ -128,14 +128,14 @@ class SingleMode(Handshake):
         self._typed = False
         if version is None:
             if answer.whole:
-                what = "answers SPACE with neither an echo nor a sign-on line: abort() ends what it does"
+                what = "answers SPACE with neither an echo nor a sign-on line; ESC ends what it does"
                 raise BadAnswer(self.title, what, Spoken(SPACE, answer.data))
             yield from self._erase()
         self.examined = yield from self._among_reports("X")
         if self.examined == "#":
-            what = "is in program mode, where lines are stored: abort() leaves it"
+            what = "is in program mode, where lines are stored: P ends it, and so does ESC"
             self.programming = True
-            raise Refused(self.title, what, Spoken(b"X\r", b"X#\r\n"), "#")
+            raise Refused(self.title, what, Spoken(b"X\r", b"X#\r\n"), "#", "abort() sends ESC")
         self.programming = False
         yield from self.reports_off()
         return version.group().decode() if version else ""
@@ -210,7 +210,14 @@ class SingleMode(Handshake):
     def _among_reports(self, letter: str) -> Steps[str]:
         """A command of one letter that no report contains; its answer, with reports that came before it."""
         yield from self.ask(letter.encode(), until(letter.encode()), self.patience)
-        return (yield from self.ask(CR, until(b"\r\n"), self.patience))[:-2].decode("latin-1")
+        answer = yield Ask(CR, until(b"\r\n"), self.patience)
+        if answer.data == CR:  # which no unit echoes
+            raise BadAnswer(self.title, ECHOES, Spoken(letter.encode() + CR, letter.encode() + CR))
+        if not answer.whole:
+            what = "does not finish its answer" if answer.data else "does not answer"
+            spoken = Spoken(letter.encode() + CR, letter.encode() + answer.data)
+            raise NoAnswer(self.title, f"{what} within {self.patience:g} s", spoken)
+        return answer.data[:-2].decode("latin-1")
 
     def _erase(self) -> Steps[None]:
         """Take back what stands in the line: BS is echoed as long as there is something (page 22)."""
@@ -242,8 +249,8 @@ class PartyLine(Handshake):
         try:
             yield from self.line("", 0.0)
         except Deaf as error:
-            what = "is not on the line: is this its name, and is it in party line mode (strap PARTY, or party_line())?"
-            raise NoAnswer(self.title, what, error.spoken) from None
+            what = "is not on the line: is this its name, and is it in party line mode (strap PARTY, or ^P)?"
+            raise NoAnswer(self.title, what, error.spoken, "party_line() sends ^P") from None
         return ""
 
     def line(self, text: str, seconds: float, tries: int = TRIES) -> Steps[str]:
@@ -370,8 +377,8 @@ class Adapter(Handshake):
         except Refused as error:
             known = yield from self.known()
             if known:
-                what = f"is not known to the adapter, which knows {', '.join(known)}: scan() looks anew, and resets all"
-                raise NoAnswer(self.title, what, error.spoken) from None
+                what = f"is not known to the adapter, which knows {', '.join(known)}; & looks anew, and resets all"
+                raise NoAnswer(self.title, what, error.spoken, "scan() sends &") from None
             yield from self.scan()
         except Deaf:
             pass  # it is known, and runs a program
@@ -401,7 +408,8 @@ class Adapter(Handshake):
         (reply,) = yield from self.spool([self.name + text], seconds)
         spoken = Spoken((self.name + text + "\r").encode("latin-1"), (reply + "\r\n").encode("latin-1"))
         if reply == "#":
-            raise Refused(self.title, "is not known to the adapter: scan() looks for axes, and resets all", spoken, "#")
+            what = "is not known to the adapter; & looks for axes, and resets all"
+            raise Refused(self.title, what, spoken, "#", "scan() sends &")
         if reply == "?":
             raise Deaf(self.title, "takes no line: a program runs, it jogs, or it is gone", spoken)
         if reply.endswith("?"):

@@ -202,7 +202,7 @@ class Memory(Commands):
         """
         wanted = bytes_of(saved)
         if (yield from self._number("^")) & 3:
-            raise Busy(self.title, "moves: wait() or stop() before a restore")
+            raise Busy(self.title, "moves", advice="wait() or stop() before a restore")
         before = yield from self._all("reading what is there")
         left = (STATUS_BYTE,) if self.mode == "single" else (STATUS_BYTE, NAME)
         places = [a for a in range(SIZE) if wanted[a] != before[a] and a not in left]

@@ -59,6 +59,7 @@ class Unit(Axis):
         self.version = ""  # as the sign-on line tells
         self._connected = False
         self._stops = 0  # how often the axis was stopped
+        self._times_told = 0  # how often it was told to do something else
         self._target: int | None = None  # where the index under way should end, if that is known
         self._search = 0  # direction of the search for home under way
         self._divide: int | None = None
@@ -92,6 +93,7 @@ class Unit(Axis):
         For what has no call of its own: other firmware, the retired ``E n``. It knows nothing of pending periods. A
         unit that was left in program mode takes it all the same, and stores it; ``P`` ends that mode (page 47).
         """
+        self._fits(text)
         if not self._connected:
             try:
                 yield from self.connect()
@@ -103,15 +105,18 @@ class Unit(Axis):
 
     def _line(self, text: str, seconds: float = QUICK) -> Steps[str]:
         """One line to a unit that is ready for it."""
-        longest = self._way.longest
-        if len(text) > longest:
-            behind = "behind the name " if longest != SingleMode.longest else ""
-            raise ValueError(f"{text!r} has {len(text)} characters; a line has {longest} {behind}(pages 22 and 25)")
+        self._fits(text)
         if not self._connected:
             yield from self.connect()
         if self._way.running:
             yield from self._see_it_over()
         return (yield from self._enter(text, seconds))
+
+    def _fits(self, text: str) -> None:
+        longest = self._way.longest
+        if len(text) > longest:
+            behind = "behind the name " if longest != SingleMode.longest else ""
+            raise ValueError(f"{text!r} has {len(text)} characters; a line has {longest} {behind}(pages 22 and 25)")
 
     def _enter(self, text: str, seconds: float, tries: int = TRIES) -> Steps[str]:
         """One line. If it breaks off, what stands in the line is not known: the next call clears it by connecting."""
@@ -127,7 +132,7 @@ class Unit(Axis):
     def _see_it_over(self) -> Steps[None]:
         """Raises Busy if the program that was started still runs."""
         if not (yield from self._way.over()):
-            raise Busy(self.title, "runs a program and takes no line: wait() for its end, stop() or halt() it")
+            raise Busy(self.title, "runs a program and takes no line", advice="wait() for its end, stop() or halt() it")
         self._way.running = False
 
     def _number(self, text: str, seconds: float = QUICK) -> Steps[int]:
@@ -162,6 +167,7 @@ class Unit(Axis):
     def _leave(self, target: int | None) -> None:
         """Another motion begins, or the one under way is ended: it should end at `target`, if that is known."""
         self._target, self._search = target, 0
+        self._times_told += 1
 
     # -- resets ------------------------------------------------------------------------------------------
 

@@ -63,12 +63,12 @@ class Commands(Dialogue):
     @operation
     def go_to(self, position: int) -> Steps[None]:
         """G: begin to go to a position; a motor that moves stops first."""
-        yield from self.order(f"{_position(position)}G")
+        yield from self.order(f"{as_position(position)}G")
 
     @operation
     def go_by(self, steps: int) -> Steps[None]:
         """S with a number: begin to go so far, from the target of a running go, else from where it is (page 33)."""
-        yield from self.order(f"{_position(steps)}S", again=False)
+        yield from self.order(f"{as_position(steps)}S", again=False)
 
     @operation
     def slew(self, direction: int) -> Steps[None]:
@@ -80,7 +80,7 @@ class Commands(Dialogue):
     @operation
     def go_both(self, position: int) -> Steps[None]:
         """B, G: begin to go to a position with both motors at once."""
-        yield from self.order(f"B{_position(position)}G{self.motor}")
+        yield from self.order(f"B{as_position(position)}G{self.motor}")
 
     @operation
     def stop_both(self) -> Steps[None]:
@@ -119,7 +119,7 @@ class Commands(Dialogue):
     @operation
     def set_position(self, position: int) -> Steps[None]:
         """=: call the place where the motor is `position`; a motor that moves stops."""
-        yield from self.order(f"{_position(position)}=", again=False)
+        yield from self.order(f"{as_position(position)}=", again=False)
 
     # -- rates -------------------------------------------------------------------------------------------
 
@@ -254,7 +254,8 @@ class Commands(Dialogue):
             raise BadAnswer(self.title, f"was given {wanted} by {command} and has {told}: say it again")
 
 
-def _position(position: int) -> str:
+def as_position(position: int) -> str:
+    """`position` as a command has it. Raises ValueError."""
     if not -LARGEST <= position <= LARGEST:
         raise ValueError(f"a position is {-LARGEST} to {LARGEST} microsteps, not {position}")
     return str(position)

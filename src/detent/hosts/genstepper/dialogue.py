@@ -12,7 +12,7 @@ from enum import IntEnum
 from typing import Final
 
 from detent.hosts.axis import Axis
-from detent.hosts.errors import BadAnswer, NoAnswer, Spoken
+from detent.hosts.errors import ECHOES, BadAnswer, DriverError, NoAnswer, Spoken
 from detent.hosts.exchange import Ask, Clear, Pause, Steps
 
 MOTORS: Final = ("X", "Y")
@@ -93,12 +93,23 @@ class Dialogue(Axis):
             yield from self._flush()
             if not (left and again):
                 break
-        spoken = Spoken(data, answer.data)
-        advice = "" if again else "; it may have obeyed: ask moving() and position()"
-        if b"*" in answer.data:
-            raise BadAnswer(self.title, f"its answer was damaged{advice}", spoken)
-        what = "does not finish its answer" if answer.data else "does not answer"
-        raise NoAnswer(self.title, f"{what} within {timeout:.3g} s{advice}", spoken)
+        raise self._trouble(data, answer.data, timeout, again)
+
+    def _trouble(self, data: bytes, came: bytes, timeout: float, again: bool) -> DriverError:
+        spoken = Spoken(data, came)
+        may = "" if again else "; it may have obeyed"
+        advice = may and "ask moving() and position()"
+        if came == data:
+            return BadAnswer(self.title, ECHOES, spoken)
+        if b"$version" in came:
+            what = (
+                "has just been reset and did not hear what it was told: wait until it has signed on, and say it again"
+            )
+            return BadAnswer(self.title, what, spoken)
+        if b"*" in came:
+            return BadAnswer(self.title, f"its answer was damaged{may}", spoken, advice)
+        what = "does not finish its answer" if came else "does not answer"
+        return NoAnswer(self.title, f"{what} within {timeout:.3g} s{may}", spoken, advice)
 
     def _flush(self) -> Steps[None]:
         """Drop what the board may still have to say, and what it has said."""

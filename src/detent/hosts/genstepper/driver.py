@@ -18,8 +18,12 @@ from detent.hosts.genstepper.commands import (
     STOP_RATE,
     Commands,
     Reports,
+    as_position,
 )
 from detent.hosts.genstepper.dialogue import MOTORS, TRIES, Action
+
+GOING: Final = (Action.RAMPING_UP, Action.RUNNING, Action.SLOWING, Action.STOPPING_TO_GO)
+"""Report -8 of a motor that goes to a target."""
 
 NO_RAMP: Final = RATES[-1]  # a stop rate at which everything may stop at once (page 29)
 
@@ -31,6 +35,7 @@ class GenStepper(Commands):
     """
 
     _target: int | None = None  # where the move under way should end
+    _times_told = 0  # how often this driver has told the motor to do something else
     _keep: int | None = None  # K, where it is known
     _slew: int | None = None  # R as moves shall have it
     _run: int | None = None  # R as it is
@@ -38,26 +43,40 @@ class GenStepper(Commands):
     def forget(self) -> None:
         """The connection was lost, or the board was reset: nothing is known of it."""
         super().forget()
-        self._target = self._keep = self._slew = self._run = None
+        self._begin()
+        self._keep = self._slew = self._run = None
+
+    def _begin(self) -> None:
+        """Something else begins: where it ends is not known yet; who waits for what was before learns of it."""
+        self._target = None
+        self._times_told += 1
 
     # -- the common face ---------------------------------------------------------------------------------
 
     @operation
     def move_to(self, position: int) -> Steps[None]:
         """Begin a move to `position` and return; a motor that moves stops first."""
-        self._target = None
+        self._begin()
         yield from self._at_slew()
         yield from self.go_to(position)
         self._target = position
 
     @operation
     def move_by(self, steps: int) -> Steps[None]:
-        """Begin a move by `steps`, from the target of a move under way, else from where it is; and return."""
-        self._target = None
+        """Begin a move by `steps`, from the target of a move under way, else from where it is; and return.
+
+        Where a motor that slews or stops is when S reaches it, the board alone knows: its target is read back.
+        """
+        self._begin()
         yield from self._at_slew()
-        told = yield from self.reports()
-        yield from self.go_by(steps)
-        self._target = None if told.action == Action.SLEWING else told.target + steps
+        before = yield from self.reports()
+        told = Reports(*(yield from self.ask(f"{as_position(steps)}S", 0, again=False)))
+        if before.action in GOING:
+            self._target = before.target + steps
+        elif before.action == Action.IDLE:
+            self._target = before.position + steps
+        elif told.action in GOING:
+            self._target = told.target
 
     @operation
     def run_at(self, rate: float) -> Steps[None]:
@@ -65,9 +84,10 @@ class GenStepper(Commands):
         whole = round(abs(rate))
         if whole not in RATES:
             raise ValueError(f"a rate to run at is {RATES[0]} to {RATES[-1]} microsteps/s, not {rate:g}; or stop()")
+        self._begin()
         if self._slew is None:
             self._slew = yield from self.report(RUN_RATE)
-        self._target = self._run = None
+        self._run = None
         yield from self.set_run_rate(whole)
         self._run = whole
         yield from self.slew(1 if rate > 0 else -1)
@@ -75,19 +95,22 @@ class GenStepper(Commands):
     @operation
     def stop(self) -> Steps[None]:
         """Z: ramp down to the stop rate and stand. Nothing happens if the motor stands already."""
-        self._target = None
+        self._begin()
         yield from self.order("Z")
 
     @operation
     def halt(self) -> Steps[None]:
-        """Stop this motor at once: K of 62500, at which everything may stop (page 29), Z, and K as it was."""
-        self._target = None
+        """Stop this motor at once: Z, K of 62500, at which everything may stop (page 29), and K as it was.
+
+        Z first: K alone would end the stop in which a motor reverses, and let it start the other way at full rate.
+        """
+        self._begin()
         keep = self._keep
         if keep is None:
             keep = yield from self.report(STOP_RATE)
         self._keep = None
         try:
-            yield from self.order(f"{NO_RAMP}KZ")
+            yield from self.order(f"Z{NO_RAMP}K")
             yield from self.set_stop_rate(keep)
         except DriverError as error:
             what = f"{error.what}; it was being halted, and its stop rate may be {NO_RAMP}: set_stop_rate({keep})"
@@ -111,12 +134,19 @@ class GenStepper(Commands):
     def wait(self, timeout: float | None = None) -> Steps[None]:
         """Wait until the motor stands, for `timeout` seconds at most (None: as long as it takes).
 
-        Raises MotionFailed then, and when a move ended elsewhere than it should have: at a limit, say.
+        Raises MotionFailed then, and when a move ended elsewhere than it should have: at a limit, say. A stop by
+        another thread ends the wait and is no failure.
         """
-        target, position = self._target, None
+        position = None
         for _ in range(TRIES):  # nothing but another answer tells a damaged figure from a sound one
             yield from super().wait(timeout)
-            if target is None or (position := (yield from self.position())) == target:
+            target, told = self._target, self._times_told
+            if target is None:
+                return
+            position = yield from self.position()
+            if self._times_told != told:
+                return
+            if position == target:
                 self._target = None
                 return
         self._target = None

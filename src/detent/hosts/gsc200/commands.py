@@ -10,6 +10,7 @@ from typing import NamedTuple
 from detent.hosts.errors import BadAnswer, NoAnswer, Refused
 from detent.hosts.exchange import Ask, Steps, operation
 from detent.hosts.gsc200 import language
+from detent.hosts.gsc200.dialogue import LISTED as LISTED_LINES
 from detent.hosts.gsc200.dialogue import LONGEST, TRIES, Again, Dialogue
 
 EEPROM_SECONDS = 5.0  # the datasheet does not say how long M takes
@@ -143,6 +144,9 @@ class Commands(Dialogue):
         """V1: the position counter. Raises Busy while it moves: only F, Z and K are answered then."""
         text = yield from self.say("V1", POSITION, Again.AT_ONCE)
         self.judge("V1", text)
+        if (text[1:2] in ("+", "-")) != self.signed:
+            other = language.MODELS[not self.signed]
+            raise BadAnswer(self.title, f"has the counter of a {other.upper()}: say model {other}", self._spoken)
         return int(text[1:])
 
     @operation
@@ -237,13 +241,13 @@ class Commands(Dialogue):
             assert text is not None
             if text == "B" or (text.startswith("E") and text != "END"):
                 self.judge("Q", text)
-            lines = []
-            while text is not None and text != "END":
+            lines: list[str] = []
+            while text is not None and text != "END" and len(lines) < LISTED_LINES:
                 lines.append(text)
                 text = yield from self._next_listed()
             if text == "END":
                 return [self._listed(one) for one in lines]
-            yield from self._quiet()
+            yield from self._quiet(LISTED_LINES)
         raise BadAnswer(self.title, f"its list of the program was damaged {TRIES} times")
 
     # -- arguments ---------------------------------------------------------------------------------------

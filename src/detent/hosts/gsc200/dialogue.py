@@ -9,8 +9,8 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 from detent.hosts.axis import Axis
-from detent.hosts.errors import BadAnswer, Busy, DriverError, MotionFailed, NoAnswer, Refused, Spoken
-from detent.hosts.exchange import Answer, Ask, Clear, Pause, Steps, operation
+from detent.hosts.errors import ECHOES, BadAnswer, Busy, DriverError, MotionFailed, NoAnswer, Refused, Spoken
+from detent.hosts.exchange import LONGEST_ANSWER, Answer, Ask, Clear, Pause, Steps, operation
 from detent.hosts.gsc200.frames import LINE_BITS, Frames
 from detent.hosts.gsc200.language import GS_C200S, MODELS
 
@@ -28,6 +28,7 @@ PATIENCE = 1.0  # seconds that a module, an adapter and this computer may take t
 TRIES = 3
 MOMENT = 0.005  # seconds between two questions whether a short command is done
 MOMENTS = 200
+LISTED = 128  # lines of the longest list of a program, and more
 
 MODES: Final = {"P": True, "Po": True, "P0": True, "Px": False, "E": False}
 """The commands that enter and leave programming mode."""
@@ -115,6 +116,10 @@ class Dialogue(Axis):
         for left in reversed(range(TRIES)):
             answer = yield Ask(data, self.frames.end, timeout)
             text = self.frames.text(answer.data) if answer.whole else None
+            if answer.data == data:  # no answer reads as a question does
+                self._unended = False
+                yield from self._quiet()
+                raise BadAnswer(self.title, ECHOES, Spoken(data, answer.data))
             unheard = text == "E1" or (self._unended and text in ("E2", "E4") and left > 0)
             if text is not None and not unheard and wanted.fullmatch(text):
                 self._stale = self._unended = False
@@ -123,9 +128,8 @@ class Dialogue(Axis):
                     self.programming = MODES[command]
                 return text
             self._unended = not unheard
-            trouble = self._trouble(command, answer, Spoken(data, answer.data), timeout, unheard, again)
-            if not unheard:
-                yield from self._quiet()
+            rest = b"" if unheard else (yield from self._quiet(LISTED if command == "Q" else 2))
+            trouble = self._trouble(command, answer, Spoken(data, answer.data + rest), timeout, unheard, again)
             if not left or not (unheard or again is not Again.NEVER):
                 raise trouble
             if again is Again.WHEN_READY and not unheard and not (yield from self._settled()):
@@ -144,12 +148,13 @@ class Dialogue(Axis):
         """A delayed command that is over in a moment: it is obeyed when this returns. Raises Busy."""
         yield from self.delayed(command, Again.WHEN_READY)
         if not self.programming and not (yield from self._settled()):
-            raise Busy(self.title, f"is still busy with {command}: wait()", code="B")
+            raise Busy(self.title, f"is still busy with {command}", code="B", advice="wait()")
 
     def judge(self, command: str, text: str) -> None:
         """Raise Busy or Refused if `text`, the answer to `command`, says so."""
         if text == "B":
-            raise Busy(self.title, f"is busy and does not obey {command}: wait(), stop() or halt()", self._spoken, "B")
+            what = f"is busy and does not obey {command}; Z ramps down, K stops at once"
+            raise Busy(self.title, what, self._spoken, "B", "wait(), stop() or halt()")
         if text in ERRORS:
             raise Refused(self.title, f"refuses {command}: {ERRORS[text]} ({text})", self._spoken, text)
 
@@ -196,16 +201,27 @@ class Dialogue(Axis):
 
     def _settled(self) -> Steps[bool]:
         """Wait until it is ready, a moment at most. Whether it is."""
+        began = None
         for _ in range(MOMENTS):
             if not (yield from self._asked()).busy:
                 return True
-            yield Pause(MOMENT)
+            now = (yield Pause(MOMENT)).at
+            began = now if began is None else began
+            if now - began > MOMENT * MOMENTS + self.patience:
+                break
         return False
 
-    def _quiet(self) -> Steps[None]:
-        """Let whatever may still come pass by."""
-        while (yield Ask(b"", len_or_none, 2 * LONGEST * self._character)).data:
-            pass
+    def _quiet(self, lines: int = 2) -> Steps[bytes]:
+        """Let whatever may still come pass by, so many lines of it: a line may babble for ever. What has come."""
+        heard = b""
+        began, longest, left = None, self.patience / 2 + lines * LONGEST * self._character, LONGEST_ANSWER
+        while left > 0 and (came := (yield Ask(b"", len_or_none, 2 * LONGEST * self._character))).data:
+            began = came.at if began is None else began
+            left -= len(came.data)
+            heard += came.data
+            if came.at - began > longest:
+                break
+        return heard
 
     def _trouble(
         self, command: str, answer: Answer, spoken: Spoken, timeout: float, unheard: bool, again: Again
@@ -213,11 +229,16 @@ class Dialogue(Axis):
         if unheard:
             what = f"does not receive {command} undamaged: {ERRORS['E1']} (E1); is CHS strapped as checksums says?"
             return Refused(self.title, what, spoken, "E1")
-        advice = "" if again is Again.AT_ONCE else f"; it may have obeyed {command}: ask moving() and position()"
+        may = "" if again is Again.AT_ONCE else f"; it may have obeyed {command}"
+        advice = may and "ask moving() and position()"
         if answer.whole:
-            return BadAnswer(self.title, f"its answer to {command} was damaged{advice}", spoken)
+            plain = self.frames._replace(checksums=False).text(answer.data)
+            if self.frames.checksums and plain is not None and (ORDERED.fullmatch(plain) or STATE.fullmatch(plain)):
+                may = "; it came without a checksum: is CHS strapped low (checksums=False, --no-checksum)?"
+                advice = ""
+            return BadAnswer(self.title, f"its answer to {command} was damaged{may}", spoken, advice)
         what = "does not finish its answer" if answer.data else "does not answer"
-        return NoAnswer(self.title, f"{what} to {command} within {timeout:.3g} s{advice}", spoken)
+        return NoAnswer(self.title, f"{what} to {command} within {timeout:.3g} s{may}", spoken, advice)
 
 
 def len_or_none(data: bytes) -> int | None:
