@@ -111,6 +111,17 @@ class TestWhatGoesWrong:
             bed.run(short(bed))
         assert max(map(abs, bed.port.seen)) < 1
 
+    def test_a_carriage_clear_of_the_witness_goes_there_no_farther_than_it_was_told(self) -> None:
+        bed = gsc200s(where="to = -30.0")
+        plan = bed.plan(*SAFE, moves=(160,), room=SHORT._replace(approach=20))
+        with pytest.raises(MachineError, match="still open after the 20 steps"):
+            bed.run(plan)
+        assert min(bed.port.seen) > -21
+        bed = gsc200s(where="to = -3.0")
+        bed.on[1] = lambda: bed.cell.breaks(StuckSwitch("home", 0))
+        with pytest.raises(MachineError, match="still closed"):
+            bed.run(plan)
+
     def test_on_another_switch_of_the_same_wire_it_does_not_run_into_the_end(self) -> None:
         """HOME, EOT and UI1 are one wire, closed at both ends, and the carriage stands at the far one."""
         bed = gsc200s(where="from = -20.0")

@@ -9,12 +9,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from detent.hosts.axis import Axis
-from detent.hosts.errors import DriverError, MotionFailed, Refused
+from detent.hosts.errors import DriverError, MotionFailed
 from detent.hosts.exchange import Rest, Steps, attempt
 from detent.moves.law import Law, Values
 
 POLL = 0.01  # seconds between two questions whether a motion is over
-STEP_COUNT_OVERFLOW = "E5"
 
 
 class WitnessError(ValueError):
@@ -155,13 +154,7 @@ class GsC200Bench(Bench):
 
     def _start(self, steps: int) -> Steps[None]:
         yield from self.driver.fresh()
-        try:
-            yield from self.driver.move(steps)
-        except Refused as error:
-            if error.code != STEP_COUNT_OVERFLOW:
-                raise
-            what = f"{error.what}; its counter cannot go below 0: begin with the carriage farther on the witness"
-            raise MotionFailed(self.title, what, error.spoken) from error
+        yield from self.driver.move(steps)
 
     def between(self, before: int, after: int) -> int:
         """A GS-C200 counts from 0 to 9 999 999 and begins again."""

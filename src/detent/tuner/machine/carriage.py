@@ -25,13 +25,15 @@ class Room(NamedTuple):
     """The axis in steps. `travel` is how far it may go from the witness, `behind` how far past where that closes.
 
     `turn` is an electrical turn (four full steps): steps are lost in whole ones of these. `rate` is a speed (steps/s)
-    at which the motor surely starts and stops without a ramp.
+    at which the motor surely starts and stops without a ramp. `approach` is how far from the witness the carriage may
+    stand at the start, if it may stand clear of it.
     """
 
     travel: int
     behind: int
     turn: int
     rate: int
+    approach: int = 0
 
     @property
     def clearance(self) -> int:
@@ -112,19 +114,40 @@ class Carriage:
             )
         return made
 
+    def _countable(self) -> int:
+        """Steps back that the unit can count. Raises MachineError if there are none."""
+        lowest = self.bench.lowest
+        if lowest is None or self.bench.away < 0:
+            return self.room.travel
+        if self._at <= lowest:
+            raise MachineError(
+                f"the witness is open where {self.bench.title} counts {lowest}, and it goes no farther back. Switch it "
+                "off, push the carriage farther onto the witness, switch it on, and begin again"
+            )
+        return self._at - lowest
+
     # -- the witness -------------------------------------------------------------------------------------
 
     def begin(self) -> Steps[None]:
-        """The first reference. The carriage must stand on the witness: so it is known that the witness can close."""
+        """The first reference. The carriage must stand on the witness: so it is known that the witness can close.
+
+        Or at most `approach` steps from it: then it goes there, and not farther.
+        """
         yield from self.bench.prepare()
         self._zero = None
         self._at = yield from self.bench.count()
-        if self.bench.sees_opening and not (yield from self.bench.closed()):
-            raise MachineError(
-                "the witness is open. Put the carriage on it, so that it is closed, and begin again. Nothing was moved, "
-                "as a switch that never closes would let the carriage run into the end"
-            )
         yield from self.bench.slowly(self.room.rate)
+        gone, most = 0, self.room.approach
+        while self.bench.sees_opening and not (yield from self.bench.closed()):
+            if not most:
+                raise MachineError(
+                    "the witness is open: put the carriage on it, so that it is closed, and begin again. Nothing was "
+                    "moved yet, as a switch that never closes would let the carriage run into the end. If you have "
+                    "seen it work, and know how far the carriage is from it at most, say --approach STEPS"
+                )
+            if gone >= most:
+                raise MachineError(f"the witness is still open after the {most} steps of --approach")
+            gone -= yield from self._go(-min(self.room.coarse, most - gone))
         yield from self._approach((yield from self._clear(self.room.behind)))
         yield from self.reference()
 
@@ -151,7 +174,7 @@ class Carriage:
         """Towards the witness in fine steps until it closes; there is the new zero."""
         gone = 0
         while not (yield from self.bench.closed()):
-            piece = min(self.room.fine, most - gone)
+            piece = min(self.room.fine, most - gone, self._countable())
             if piece <= 0:
                 raise MachineError(
                     f"the witness did not close within {gone} steps, where it should. It is stuck open or its wire is "
@@ -205,7 +228,8 @@ class Carriage:
         """Back until the witness closes, with a look after each piece, and no farther than the count allows."""
         room = self.room
         while not (yield from self.bench.closed()):
-            piece = min(room.coarse, self.place + room.behind - room.turn)  # it swings, and closes with some play
+            # it swings, and closes with some play
+            piece = min(room.coarse, self.place + room.behind - room.turn, self._countable())
             if piece <= 0:
                 raise MachineError(
                     f"the witness is still open {-self.place} steps behind where it should have closed. Steps were "

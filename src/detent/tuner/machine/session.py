@@ -51,7 +51,7 @@ class Plan:
         room = asdict(self)["room"]
         return {
             "kind": "plan", "model": self.law.model, "begin": dict(self.begin), "moves": list(self.moves),
-            "room": dict(zip(self.room._fields, room, strict=True)), "knob": bench.knob.name, "away": bench.away,
+            "room": dict(zip(self.room._fields[:-1], room, strict=False)), "knob": bench.knob.name, "away": bench.away,
             "trials": self.trials, "confirm": self.confirm, "reserve": self.reserve or bench.knob.reserve,
         }  # fmt: skip
 
