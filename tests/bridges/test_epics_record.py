@@ -524,15 +524,15 @@ def test_spmg_stops_pauses_and_goes_on() -> None:
         move = asyncio.create_task(record.put("VAL", 20))
         await bench.until(lambda: bench["RBV"] > 1)
         await record.put("SPMG", Go.PAUSE)
-        await move
+        assert "SPMG became Pause before it arrived" in await failure(move)
         assert bench["RBV"] < 20
         assert bench["VAL"] == 20, "it knows where to go on to"
-        await record.put("VAL", 15)
+        assert "SPMG is Pause: it goes there when SPMG is Go" in await failure(record.put("VAL", 15))
         assert bench["RBV"] < 15
         await record.put("SPMG", Go.GO)
         assert (bench["RBV"], bench["MISS"]) == (15, 0)
         await record.put("SPMG", Go.STOP)
-        await record.put("VAL", 1)
+        assert "SPMG is Stop: put Go to SPMG first" in await failure(record.put("VAL", 1))
         assert (bench["VAL"], bench["RBV"]) == (15, 15), "stopped is stopped"
         await record.put("SPMG", Go.MOVE)
         await record.put("VAL", 14)
@@ -552,6 +552,160 @@ def test_a_status_update_and_a_new_resolution() -> None:
         await record.put("MRES", 0.02)
         assert (bench["RBV"], bench["VAL"], bench["RRBV"]) == (6.42, 6.42, 321)
         assert "no resolution" in await failure(record.put("MRES", 0))
+
+    run(test)
+
+
+def test_a_record_that_is_held_moves_by_no_put_at_all() -> None:
+    async def test() -> None:
+        bench = Bench("gs-c200s")
+        record = await bench.begin()
+        for held in (Go.STOP, Go.PAUSE):
+            await record.put("SPMG", held)
+            for field, value in (("VAL", 1), ("DVAL", 1), ("RVAL", 100), ("RLV", 1), ("TWF", 1), ("TWR", 1),
+                                 ("JOGF", 1), ("JOGR", 1), ("HOMF", 1), ("HOMR", 1)):  # fmt: skip
+                assert f"SPMG is {held.name.capitalize()}" in await failure(record.put(field, value))
+                assert (bench.shaft(), bench["DMOV"], bench["JOGF"], bench["HOMF"]) == (0, 1, 0, 0)
+        await failure(record.put("VAL", 3))
+        assert bench["VAL"] == 3
+        await record.put("SPMG", Go.STOP)
+        assert bench["VAL"] == 0, "a stop forgets where it was to go"
+        await record.put("SPMG", Go.GO)
+        assert bench.shaft() == 0
+
+    run(test)
+
+
+@pytest.mark.parametrize("model", ALL)
+def test_a_speed_that_is_refused_does_not_stay(model: str) -> None:
+    async def test() -> None:
+        bench = Bench(model)
+        record = await bench.begin()
+        await record.put("VMAX", 1e6)
+        before = {name: bench[name] for name in ("VELO", "VBAS", "ACCL", "ACCS", "ACCU")}
+        for field, value in (("VELO", 1e6), ("ACCL", -1), ("ACCS", -1), ("ACCS", 0), ("VELO", -1)):
+            try:
+                await record.put(field, value)
+            except PutFailed:
+                assert {name: bench[name] for name in before} == before, field
+            else:
+                made = bench[field]
+                assert made <= bench.motor.fastest * 0.01 or field.startswith("ACC")
+                before = {name: bench[name] for name in before}
+        await record.put("VAL", 1)
+        assert bench["RBV"] == 1
+
+    run(test)
+
+
+@pytest.mark.parametrize("model", ALL)
+def test_the_largest_velocity_is_the_units_own(model: str) -> None:
+    async def test() -> None:
+        bench = Bench(model)
+        record = await bench.begin()
+        assert bench["VMAX"] == bench.motor.fastest * 0.01 > 0
+        await record.put("VELO", bench["VMAX"])
+        assert bench["VELO"] >= bench["VMAX"], "and it can be had, as the unit rounds it"
+
+    run(test)
+
+
+def test_two_accelerations_are_one_and_the_one_that_was_put_last_stays() -> None:
+    async def test() -> None:
+        bench = Bench("dcb-274", Settings(resolution=0.01, velocity=10, base=2, acceleration=0.5))
+        record = await bench.begin()
+        assert bench["ACCS"] == pytest.approx(bench["VELO"] / bench["ACCL"])
+        await record.put("ACCS", 40)
+        assert (bench["ACCU"], bench["ACCL"]) == (1, pytest.approx(0.25, rel=0.1))
+        await record.put("VELO", 20)
+        assert bench["ACCL"] == pytest.approx(0.5, rel=0.1)
+        await record.put("ACCL", 0.4)
+        await record.put("VELO", 10)
+        assert (bench["ACCU"], bench["ACCL"]) == (0, pytest.approx(0.4, rel=0.1))
+
+    run(test)
+
+
+def test_limits_in_three_coordinates_and_the_wrong_way_round() -> None:
+    async def test() -> None:
+        bench = Bench("gs-c200s", Settings(resolution=-0.01, low=-50, high=40, velocity=10, base=2))
+        record = await bench.begin()
+        assert (bench["RLLM"], bench["RHLM"]) == (-4000, 5000)
+        await record.put("RHLM", 3000)
+        assert (bench["DLLM"], bench["LLM"], bench["RHLM"]) == (-30, -30, 3000)
+        for field, value in (("DLLM", 41), ("DHLM", -31), ("LLM", 40.5), ("HLM", -30.5), ("RHLM", -4001)):
+            assert "above the high limit" in await failure(record.put(field, value)), field
+            assert (bench["DLLM"], bench["DHLM"]) == (-30, 40)
+        await record.put("MRES", -0.02)
+        assert (bench["DLLM"], bench["DHLM"], bench["RHLM"]) == (-60, 80, 3000), "they stay in steps"
+        assert bench["VELO"] == 20
+
+    run(test)
+
+
+def test_equal_limits_leave_one_place_and_zeros_are_none() -> None:
+    async def test() -> None:
+        bench = Bench("gs-c200s")
+        record = await bench.begin()
+        await record.put("VAL", 5)
+        await record.put("DLLM", 5)
+        await record.put("DHLM", 5)
+        assert "outside the limits" in await failure(record.put("VAL", 5.01))
+        await record.put("DLLM", 0)
+        assert bench["LVIO"] == 0
+        await record.put("DHLM", 0)
+        await record.put("VAL", 60)
+        assert bench["RBV"] == 60
+
+    run(test)
+
+
+def test_a_violation_follows_the_limits() -> None:
+    async def test() -> None:
+        bench = Bench("gs-c200s")
+        record = await bench.begin()
+        await record.put("VAL", 20)
+        await record.put("HLM", 10)
+        assert bench["LVIO"] == 1
+        for field in ("JOGF", "TWF"):
+            await failure(record.put(field, 1))
+            assert bench.shaft() == 2000, "and least of all backwards"
+        await record.put("HLM", 30)
+        assert bench["LVIO"] == 0
+        await failure(record.put("VAL", 31))
+        assert bench["LVIO"] == 1
+        await record.put("HLM", 31)
+        assert bench["LVIO"] == 0
+
+    run(test)
+
+
+@pytest.mark.parametrize(("field", "value"), [("VAL", 40), ("JOGF", 1)])
+def test_a_limit_moved_in_front_of_a_motion_stops_it(field: str, value: float) -> None:
+    async def test() -> None:
+        for low, high in ((-50, 50), (0, 0)):
+            bench = Bench("bs0710", Settings(resolution=0.01, low=low, high=high, velocity=10, base=2))
+            record = await bench.begin()
+            move = asyncio.create_task(record.put(field, value))
+            await bench.until(lambda bench=bench: bench["RBV"] > 1)
+            await record.put("DHLM", 30)
+            assert bench["LVIO"] == 1
+            assert "the limits moved" in await failure(move)
+            assert (bench["DMOV"], bench[field]) == (1, 0 if field == "JOGF" else bench["RBV"])
+            assert 1 < bench["RBV"] < 10
+
+    run(test)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -1e300, "abc", 1e12])
+def test_what_is_no_number_of_a_field_fails_and_changes_nothing(value: Any) -> None:
+    async def test() -> None:
+        bench = Bench("dcb-274", Settings(resolution=0.01, velocity=10, base=2))
+        record = await bench.begin()
+        for field in ("VAL", "DVAL", "RVAL", "RLV", "SPMG", "DIR", "PREC"):
+            before = dict(record.fields)
+            await failure(record.put(field, value))
+            assert record.fields == before, field
 
     run(test)
 

@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -169,7 +169,7 @@ while motor.moving:
 told["where"] = motor.position
 motor.velocity.put(50, wait=True)
 motor.set_current_position(2)
-told["set"] = motor.user_readback.get(use_monitor=False)  # a put may be answered before its monitors have come
+told["set"] = motor.user_readback.get(use_monitor=False)
 motor.user_offset.put(0, wait=True)
 kinds = []
 RunEngine()(scan([det], motor, 1, 3, 5), lambda name, document: kinds.append(name))
@@ -202,9 +202,9 @@ def test_ophyd_async_moves_stops_and_scans(ioc: Ioc) -> None:
 import asyncio, json
 from bluesky import RunEngine
 from bluesky.plan_stubs import mv
-from bluesky.plans import scan
+from bluesky.plans import list_scan, scan
 from ophyd.sim import det
-from ophyd_async.core import init_devices
+from ophyd_async.core import FlyMotorInfo, init_devices
 from ophyd_async.epics.motor import Motor, MotorLimitsError
 told = {}
 engine = RunEngine()
@@ -237,10 +237,28 @@ asyncio.run_coroutine_threadsafe(by_hand(), engine.loop).result(100)
 kinds = []
 engine(scan([det], motor, 1, 3, 5), lambda name, document: kinds.append(name))
 told["scan"] = kinds
+places = []
+def keep(name, document):
+    if name == "event":
+        places.append(document["data"]["motor"])
+engine(list_scan([det], motor, [0, 1, 2, 3, 2.5, 2]), keep)
+told["places"] = places
 engine(mv(motor, 0))
+
+async def flies():
+    told["most"] = await motor.max_velocity.get_value()
+    await motor.prepare(FlyMotorInfo(start_position=1, end_position=3, time_for_move=1))
+    await motor.kickoff()
+    await motor.complete()
+    told["flown"] = await motor.user_readback.get_value()
+
+asyncio.run_coroutine_threadsafe(flies(), engine.loop).result(100)
 print(json.dumps(told))
 """)
     assert told["position"] == 5
+    assert told["places"] == [0, 1, 2, 3, 2.5, 2], "documents have the positions of their own points"
+    assert told["most"] == 625, "62 500 microsteps/s of 0.01 mm"
+    assert told["flown"] >= 3
     assert told["refused"] == "MotorLimitsError"
     assert told["stopped"] == "RuntimeError"
     assert 5.1 <= told["where"] < 40
@@ -314,3 +332,41 @@ def test_an_address_that_is_not_this_computers_fails_in_one_line() -> None:
     assert ended.stderr.startswith("detent: Channel Access cannot be served: ")
     assert "choose another --ca-port or --interfaces" in ended.stderr
     assert ended.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "at"),
+    [
+        ([], "1000"),
+        (["--resolution", "0.0025", "--low", "-10", "--high", "40"], "2"),
+        (["--resolution", "0.01", "--velocity", "50", "--low", "-10", "--high", "40"], "20"),
+        (["--low", "-40", "--high", "-10"], "-20"),
+        (["--low", "30", "--high", "40"], "35"),
+        (["--resolution", "0.0025", "--velocity", "5", "--low", "0", "--high", "0.001"], "0.0005"),
+    ],
+)
+def test_the_line_to_try_is_within_the_limits(options: list[str], at: str, capsys: pytest.CaptureFixture[str]) -> None:
+    def serve(_prefix: str, _axes: object, _interfaces: object, ready: Callable[[int], None], **_: object) -> object:
+        async def nothing() -> None:
+            ready(5064)
+
+        return nothing()
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("detent.cli.epics._serve", serve)
+        patched.delenv("EPICS_CAS_INTF_ADDR_LIST", raising=False)
+        with pytest.raises(SystemExit) as ended:
+            main(["epics", "gs-c200s", *options])
+    out = capsys.readouterr().out
+    assert ended.value.code == 0
+    assert f"  caput -c -w 60 SIM:m1 {at}\n" in out
+    assert "--interfaces 127.0.0.1 keeps it to this computer" in out
+
+
+def test_the_names_of_the_fields_are_listed_and_that_is_all(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["epics", "bs0610", "--list-pvs", "--prefix", "A:"])
+    names = capsys.readouterr().out.splitlines()
+    assert ended.value.code == 0
+    assert {"A:m1.VAL", "A:m2.VAL", "A:m1.ACCS", "A:m1.ACCU", "A:m1.RHLM", "A:m1.RLLM", "A:m1.RSTM"} <= set(names)
+    assert len(names) == len(set(names))

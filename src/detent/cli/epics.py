@@ -80,7 +80,7 @@ def epics(
     egu
         EGU: the engineering unit, like mm.
     low
-        DLLM: the low dial limit. Limits that are equal are none.
+        DLLM: the low dial limit. Both limits at 0 are none.
     high
         DHLM: the high dial limit.
     velocity
@@ -88,15 +88,15 @@ def epics(
     base
         VBAS: units/s at which a move begins; a fifth of the velocity unless you say.
     max_velocity
-        VMAX: the largest velocity that a client may set.
+        VMAX: the largest velocity that a client may set; the unit's own unless you say.
     acceleration
         ACCL: seconds from the base velocity to the velocity.
     interfaces
-        Addresses to listen on instead of all, or of $EPICS_CAS_INTF_ADDR_LIST.
+        Addresses to listen on instead of all, or of $EPICS_CAS_INTF_ADDR_LIST. Channel Access asks for no password.
     ca_port
         Port of Channel Access; $EPICS_CA_SERVER_PORT or 5064 without it.
     list_pvs
-        Print the name of every field.
+        Print the name of every field that means something, and end.
     pace
         Emulated: run so many times as fast as real time.
     line_timing
@@ -123,9 +123,14 @@ def epics(
             if not 0 < ca_port < 65536:
                 raise Problem("", "--ca-port", f"{ca_port} is no port; it takes 1 to 65535")
             os.environ["EPICS_CA_SERVER_PORT"] = str(ca_port)
-        need("epics", "EPICS records need")
+        if not list_pvs:
+            need("epics", "EPICS records need")
         with _axes(target, port, unit, given, pace=pace, line_timing=line_timing, strap=strap, options=set_) as axes:
-            ready = _ready(prefix, axes, json=json, fields=list_pvs)
+            if list_pvs:
+                _print_names(prefix, axes, json=json)
+                return
+            known = bool(interfaces or os.environ.get("EPICS_CAS_INTF_ADDR_LIST"))
+            ready = _ready(prefix, axes, json=json, everywhere=not known)
             asyncio.run(_serve(prefix, axes, interfaces, ready, quiet=json))
     except (Problem, MissingExtra, ValueError) as error:
         asked_wrongly(error)
@@ -246,7 +251,7 @@ async def _serve(
         loop.add_signal_handler(number, serving.cancel)
     try:
         async with _motors(prefix, axes, report) as motors:
-            await serve(motors, interfaces, ready)
+            await serve(motors, interfaces, ready, report)
     except (DriverError, PortError) as error:
         failed(error)
     except OSError as error:
@@ -283,10 +288,29 @@ async def _motors(
             await port.close()
 
 
-def _ready(prefix: str, axes: Sequence[Wanted], *, json: bool, fields: bool) -> Callable[[int], None]:
-    """What tells people, or a program, that clients can connect."""
+def _print_names(prefix: str, axes: Sequence[Wanted], *, json: bool) -> None:
+    """The names of all fields that mean something."""
     from detent.bridges.epics.fields import Settings
 
+    names = [f"{prefix}{axis.record}.{field}" for axis in axes for field in Settings().fields()]
+    print(json_text.dumps(names) if json else "\n".join(names))
+
+
+def _somewhere(settings: "Settings") -> str:
+    """A position to try, within the limits and some two seconds away, in digits that say it exactly."""
+    low, high = settings.low, settings.high
+    near = float(f"{2 * settings.velocity:.0e}")
+    if not low and not high:
+        return f"{near:g}"
+    far = high if high > 0 else low
+    for at in (near if far > 0 else -near, float(f"{far / 2:.0e}"), (low + high) / 2):
+        if low <= float(f"{at:g}") <= high and at:
+            return f"{at:g}"
+    return repr(high)
+
+
+def _ready(prefix: str, axes: Sequence[Wanted], *, json: bool, everywhere: bool) -> Callable[[int], None]:
+    """What tells people, or a program, that clients can connect."""
     names = [f"{prefix}{axis.record}" for axis in axes]
 
     def tell(port: int) -> None:
@@ -299,16 +323,15 @@ def _ready(prefix: str, axes: Sequence[Wanted], *, json: bool, fields: bool) -> 
         width = max(map(len, names))
         for name, axis in zip(names, axes, strict=True):
             made = axis.settings
-            limits = f", from {made.low:g} to {made.high:g}" if made.low < made.high else ", no soft limits"
+            limits = f", from {made.low:g} to {made.high:g}" if made.low or made.high else ", no soft limits"
             step = f"{made.resolution:g} {made.egu}".strip()
             print(f"  {name:{width}}  {axis.title}: {step} a step{limits}")
-        if fields:
-            for name in names:
-                print("\n".join(f"{name}.{field}" for field in Settings().fields()))
         there = "" if port == 5064 else f"EPICS_CA_SERVER_PORT={port} "
         print("Try:")
         print(f"  {there}caget {names[0]}.RBV")
-        print(f"  {there}caput -c -w 60 {names[0]} 100")
+        print(f"  {there}caput -c -w 60 {names[0]} {_somewhere(axes[0].settings)}")
+        if everywhere:
+            print("All who reach this computer can move these axes; --interfaces 127.0.0.1 keeps it to this computer.")
         print("Ctrl-C ends it.", flush=True)
 
     return tell

@@ -36,6 +36,7 @@ class Axis(Driver):
     """
 
     poll = POLL
+    fastest: int = 0  # the largest rate at which a move can be made, steps/s
 
     @operation
     def move_to(self, position: int) -> Steps[None]:

@@ -49,6 +49,8 @@ class Supersigma(Axis, BusDriver):
     is wrong until the next `home` or `set_position`.
     """
 
+    fastest = TOP
+
     def __init__(self, drive: int = 1, *, patience: float = PATIENCE) -> None:
         """Raises ValueError."""
         drive_number(drive)

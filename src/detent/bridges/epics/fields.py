@@ -13,7 +13,16 @@ Value: TypeAlias = int | float | str
 USE, SET = 0, 1
 VARIABLE, FROZEN = 0, 1
 POSITIVE, NEGATIVE = 0, 1
+ACCL, ACCS = 0, 1  # ACCU: which of the two stays when the velocity changes
 MOST_PRECISION: Final = 9
+LONGEST_WAY: Final = (1 << 31) - 1  # steps: raw positions of a motor record have 32 bits
+LARGEST: Final = 1e100  # of any number that a client may put
+
+MENUS: Final = {"DIR": 2, "SET": 2, "FOFF": 2, "SPMG": 4, "STUP": 3, "ACCU": 2, "RSTM": 4}
+"""How many choices those fields have that are one of a list."""
+
+RANGES: Final = {"PREC": (0, 15), "DLY": (0, 3600), "RDBD": (0, LARGEST), "JVEL": (0, LARGEST)}
+"""What other fields may be."""
 
 
 class Go(IntEnum):
@@ -68,7 +77,7 @@ class Settings:
     """How a record begins.
 
     `resolution` is MRES, units of `egu` a step, negative if the axis counts the other way. Limits are dial positions,
-    equal ones are none. `base` and `velocity` are units/s (`most` the largest, 0: no such limit), `acceleration`
+    both 0 are none. `base` and `velocity` are units/s (`most` the largest, 0: what the unit can), `acceleration`
     seconds. Raises ValueError.
     """
 
@@ -83,7 +92,10 @@ class Settings:
     description: str = ""
 
     def __post_init__(self) -> None:
-        if not self.resolution:
+        numbers = (self.resolution, self.low, self.high, self.base, self.velocity, self.most, self.acceleration)
+        if not all(abs(number) <= LARGEST for number in numbers):
+            raise ValueError(f"settings are numbers up to {LARGEST:g}, not {numbers}")
+        if abs(self.resolution) < 1 / LARGEST:
             raise ValueError("a resolution of 0 is no resolution: say how far one step is, like 0.0025")
         if self.low > self.high:
             raise ValueError(f"the low limit {self.low:g} lies above the high limit {self.high:g}")
@@ -102,6 +114,12 @@ class Settings:
         assert isinstance(exponent, int)
         return min(max(-exponent, 0), MOST_PRECISION)
 
+    @property
+    def raw_limits(self) -> tuple[float, float]:
+        """RLLM and RHLM: the limits in steps."""
+        low, high = sorted((self.low / self.resolution, self.high / self.resolution))
+        return low, high
+
     def fields(self) -> dict[str, Value]:
         """What a record has from the beginning, before its motor was asked anything."""
         return {
@@ -112,10 +130,12 @@ class Settings:
             "RBV": 0.0, "DRBV": 0.0, "RRBV": 0, "RMP": 0, "REP": 0, "DIFF": 0.0, "RDIF": 0,
             "OFF": 0.0, "DIR": POSITIVE, "SET": USE, "FOFF": VARIABLE,
             "DHLM": self.high, "DLLM": self.low, "HLM": self.high, "LLM": self.low, "LVIO": 0,
+            "RHLM": self.raw_limits[1], "RLLM": self.raw_limits[0],
             "HLS": 0, "LLS": 0, "RHLS": 0, "RLLS": 0,
             "VELO": self.velocity, "VBAS": self.base, "VMAX": self.most, "ACCL": self.acceleration,
+            "ACCS": self.velocity / self.acceleration if self.acceleration else 0.0, "ACCU": ACCL,
             "JVEL": self.velocity, "TWV": abs(self.resolution), "RDBD": 0.0, "RTRY": 0, "DLY": 0.0,
             "DMOV": 1, "MOVN": 0, "MIP": int(Doing.NOTHING), "MISS": 0, "MSTA": int(Status.DONE), "TDIR": 1, "CDIR": 1,
-            "ATHM": 0, "SPMG": int(Go.GO), "STOP": 0, "SYNC": 0, "STUP": 0,
+            "ATHM": 0, "SPMG": int(Go.GO), "STOP": 0, "SYNC": 0, "STUP": 0, "RSTM": 2, "CBAK": 0,
             "HOMF": 0, "HOMR": 0, "JOGF": 0, "JOGR": 0, "TWF": 0, "TWR": 0, "SSET": 0, "SUSE": 0,
         }  # fmt: skip

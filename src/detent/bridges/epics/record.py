@@ -7,14 +7,21 @@ back to 1 even if there is nothing to move, and back only when all other fields 
 import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable
+from math import inf
 from typing import Final, Protocol
 
 from detent.bridges.epics.fields import (
+    ACCL,
+    ACCS,
     COMMUNICATION,
     FAILED,
     FROZEN,
+    LARGEST,
+    LONGEST_WAY,
+    MENUS,
     NEGATIVE,
     NO_ALARM,
+    RANGES,
     SET,
     STOPPED,
     Alarm,
@@ -30,12 +37,14 @@ from detent.hosts.exchange import AsyncPort
 
 POLL: Final = 0.02  # seconds between two looks at a motor that moves
 IDLE_POLL: Final = 1.0  # at one that stands
+SPEEDS: Final = ("VELO", "VBAS", "VMAX", "ACCL", "ACCS", "ACCU")
 
 
 class Motor(Protocol):
     """A driver of `detent.hosts` with its asynchronous shell."""
 
     port: AsyncPort
+    fastest: int
 
     async def move_to(self, position: int) -> None:
         """Begin a move to `position`."""
@@ -93,7 +102,11 @@ class MotorRecord:
         self._count = 0  # of the motions that were ever wanted
         self._wanted = 0  # the number of the one that is; 0: none
         self._stop = False  # the motion under way is to end
+        self._why = ""  # and its put fails for this
+        self._bound: float | None = None  # the dial position that the motion under way may reach; None: it searches
         self._tuned = False  # the motor has the speeds of the fields
+        self._good = {name: self.fields[name] for name in SPEEDS}  # the speeds that it took last
+        self._locked = self._number("ACCS")  # the acceleration that stays, where ACCU says so
         self._raw = 0  # where the motor was seen last
         self._status = Status(0)  # what lasts: homed, a problem, no communication
         self._puts: dict[str, Callable[[float], Awaitable[None]]] = {
@@ -103,10 +116,12 @@ class MotorRecord:
             "JOGF": lambda on: self._jog(on, +1), "JOGR": lambda on: self._jog(on, -1),
             "STOP": self._put_stop, "SPMG": self._put_go, "SYNC": self._put_sync, "STUP": self._put_status,
             "HLM": lambda to: self._put_limit(to, high=True), "LLM": lambda to: self._put_limit(to, high=False),
-            "DHLM": lambda to: self._show_limits(DHLM=to), "DLLM": lambda to: self._show_limits(DLLM=to),
+            "DHLM": lambda to: self._put_limits(high=to), "DLLM": lambda to: self._put_limits(low=to),
+            "RHLM": lambda to: self._put_raw_limit(to, high=True),
+            "RLLM": lambda to: self._put_raw_limit(to, high=False),
             "OFF": self._put_offset, "DIR": self._put_direction, "MRES": self._put_resolution,
             "SSET": lambda on: self._set(SET=1), "SUSE": lambda on: self._set(SET=0),
-            **{name: self._speed(name) for name in ("VELO", "VBAS", "VMAX", "ACCL")},
+            **{name: self._speed(name) for name in SPEEDS},
         }  # fmt: skip
 
     # -- life --------------------------------------------------------------------------------------------
@@ -117,12 +132,15 @@ class MotorRecord:
         A unit that is busy with a program of its own is asked again by and by.
         """
         met = None
+        if not self.fields["VMAX"]:
+            self.fields["VMAX"] = self._good["VMAX"] = self._motor.fastest * abs(self._number("MRES"))
         with contextlib.suppress(Busy):
             self._raw = await self._motor.position()
             met = await self._motor.limits()
             await self._tune()
         for field, value in self.fields.items():
             await self._outlet.post(field, value)
+        await self._show_limits()
         await self._show_place(met)
         await self._follow_place()
 
@@ -157,10 +175,24 @@ class MotorRecord:
 
     async def put(self, field: str, value: Value) -> None:
         """A client puts `value`; returned is when what it starts has ended. Raises PutFailed."""
+        if isinstance(self.fields.get(field), str):
+            await self._set(**{field: str(value)})
+            return
+        try:
+            number = float(value)
+        except (ValueError, OverflowError):
+            raise PutFailed(f"{value!r} is no number") from None
+        if not abs(number) <= LARGEST:
+            raise PutFailed(f"{number:g} is no number that a field can have")
+        if field in MENUS and (number not in range(MENUS[field])):
+            raise PutFailed(f"{number:g} is none of its choices, 0 to {MENUS[field] - 1}")
+        low, high = RANGES.get(field, (-LARGEST, LARGEST))
+        if not low <= number <= high:
+            raise PutFailed(f"{number:g} is outside {low:g} to {high:g}")
         if field in self._puts:
-            await self._puts[field](float(value))
+            await self._puts[field](number)
         else:
-            await self._set(**{field: value})
+            await self._set(**{field: int(number) if isinstance(self.fields.get(field), int) else number})
 
     # -- moves -------------------------------------------------------------------------------------------
 
@@ -185,6 +217,7 @@ class MotorRecord:
         if self.fields["SET"] == SET:
             await self._call_it(value)
             return
+        self._raw_of(value)
         if self._beyond(value):
             await self._set(LVIO=1)
             await self._aim(self._number("DVAL"), again=True)
@@ -192,19 +225,37 @@ class MotorRecord:
             raise PutFailed(f"dial position {value:g} is outside the limits {low:g} to {high:g}")
         if self.fields["SPMG"] == Go.STOP:
             await self._aim(self._number("DVAL"), again=True)
-            return
+            self._may_move()
         await self._set(LVIO=0)
         await self._aim(value)
-        if self.fields["SPMG"] != Go.PAUSE:
-            await self._move()
+        self._may_move("it goes there when SPMG is Go")
+        await self._move()
+
+    def _may_move(self, then: str = "put Go to SPMG first") -> None:
+        """Raise PutFailed where SPMG holds the record."""
+        held = Go(self._whole("SPMG"))
+        if held in (Go.STOP, Go.PAUSE):
+            raise PutFailed(f"SPMG is {held.name.capitalize()}: {then}")
+
+    def _raw_of(self, dial: float) -> int:
+        """The steps of a dial position. Raises PutFailed if they are more than a record counts."""
+        raw = dial / self._number("MRES")
+        if not abs(raw) <= LONGEST_WAY:
+            raise PutFailed(f"dial position {dial:g} is {raw:g} steps, and a motor record counts to {LONGEST_WAY}")
+        return round(raw)
 
     async def _move(self) -> None:
         """Go where DVAL is."""
-        target = round(self._number("DVAL") / self._number("MRES"))
-        await self._go(lambda: self._motor.move_to(target), Doing.MOVE, target - self._raw, target)
+        dial = self._number("DVAL")
+        target = self._raw_of(dial)
+        if self._beyond(dial):  # a target that was kept while limits moved
+            await self._set(LVIO=1)
+            raise PutFailed(f"dial position {dial:g} is outside the limits now")
+        await self._go(lambda: self._motor.move_to(target), Doing.MOVE, target - self._raw, target, bound=dial)
 
     async def _home(self, on: float, direction: int) -> None:
         if on:
+            self._may_move()
             raw = direction * self._raw_sign
             forward = direction > 0
             await self._set(**{"HOMF" if forward else "HOMR": 1})
@@ -221,20 +272,27 @@ class MotorRecord:
             if self.fields[field]:
                 await self._put_stop(1)
             return
+        self._may_move()
         dial = direction * self._sign
-        low, high = self._number("DLLM"), self._number("DHLM")
+        end = self._number("DHLM" if dial > 0 else "DLLM") if self._limited else dial * inf
+        if (end - self._number("DRBV")) * dial < abs(self._number("MRES")):
+            await self._set(LVIO=1)
+            raise PutFailed(f"it stands at the limit {end:g} or beyond it")
         raw = direction * self._raw_sign
         rate = abs(self._number("JVEL") / self._number("MRES"))
+        # the last whole step within the limit
+        target = 0 if not self._limited else self._inside(end, self._number("MRES"))
         await self._set(**{field: 1})
 
         async def to_the_limit() -> None:
             await self._motor.set_speeds(self._speeds()._replace(start=min(self._speeds().start, rate), slew=rate))
             self._tuned = False
-            await self._motor.move_to(round((high if dial > 0 else low) / self._number("MRES")))
+            await self._motor.move_to(target)
 
         try:
             doing = Doing.JOG_FORWARD if direction > 0 else Doing.JOG_REVERSE
-            await self._go(to_the_limit if low < high else lambda: self._motor.run_at(raw * rate), doing, raw)
+            start = to_the_limit if self._limited else lambda: self._motor.run_at(raw * rate)
+            await self._go(start, doing, raw, bound=end)
         finally:
             await self._set(**{field: 0})
 
@@ -251,15 +309,23 @@ class MotorRecord:
         before, now = self.fields["SPMG"], Go(int(value))
         await self._set(SPMG=int(now))
         if now in (Go.STOP, Go.PAUSE):
-            target = self._number("DVAL")
+            target, moved = self._number("DVAL"), bool(self.fields["MOVN"])
+            self._why = f"SPMG became {now.name.capitalize()} before it arrived"
             await self._put_stop(1)
             if now is Go.PAUSE:
                 await self._aim(target)  # where to go on to
+            elif moved or before == Go.PAUSE:
+                await self._follow_place()
         elif before in (Go.STOP, Go.PAUSE) and self._number("DVAL") != self._number("DRBV"):
             await self._move()
 
     async def _go(
-        self, start: Callable[[], Awaitable[None]], doing: Doing, direction: int, target: int | None = None
+        self,
+        start: Callable[[], Awaitable[None]],
+        doing: Doing,
+        direction: int,
+        target: int | None = None,
+        bound: float | None = None,
     ) -> None:
         """Carry out one motion in place of another that is under way. Raises PutFailed if it did not end as asked."""
         self._count += 1
@@ -268,8 +334,12 @@ class MotorRecord:
             self._stop = True
         async with self._one:
             if mine != self._wanted:
+                if not self._wanted and self._why:
+                    raise PutFailed(self._why)
                 return  # something newer came while this waited
-            self._stop = False
+            if bound is not None and self._beyond(bound):
+                raise PutFailed("the limits moved before it began")
+            self._stop, self._why, self._bound = False, "", bound
             plus = int(direction >= 0)
             self._status &= ~(Status.PROBLEM | Status.PLUS)
             self._status |= Status.PLUS if plus else Status(0)
@@ -291,7 +361,7 @@ class MotorRecord:
         motor, stopped = self._motor, False
         while await motor.moving():
             if self._stop and not stopped:
-                await self._set(MIP=int(self.fields["MIP"]) | Doing.STOP)
+                await self._set(MIP=int(self._whole("MIP") | Doing.STOP))
                 await motor.stop()
                 stopped = True
             try:
@@ -312,8 +382,10 @@ class MotorRecord:
 
         What another motion takes the place of shows no end of its own.
         """
-        if self._number("DLY"):
-            await self._motor.port.wait(self._number("DLY"))
+        settling = self._number("DLY")
+        while settling > 0 and not self._stop:
+            await self._motor.port.wait(min(settling, POLL))
+            settling -= POLL
         met = None
         try:
             self._raw = await self._motor.position()
@@ -340,6 +412,7 @@ class MotorRecord:
         elif self._stop and target is not None and missed:
             await self._raise(STOPPED)
         await self._set(MISS=int(missed))
+        await self._judge_place()
         if self.fields["SPMG"] == Go.MOVE:
             await self._set(SPMG=int(Go.PAUSE))
         await self._set(MOVN=0, MIP=0)
@@ -347,12 +420,14 @@ class MotorRecord:
         await self._set(DMOV=1)
         if problem is not None:
             raise PutFailed(str(problem))
+        if self._stop and self._why and (missed or target is None):
+            raise PutFailed(self._why)
 
     # -- settings ----------------------------------------------------------------------------------------
 
     async def _call_it(self, dial: float) -> None:
         """SET: the place where the motor stands is `dial` from now on. With a variable offset VAL stays what it is."""
-        raw = round(dial / self._number("MRES"))
+        raw = self._raw_of(dial)
         try:
             async with self._one:
                 await self._motor.set_position(raw)
@@ -365,6 +440,7 @@ class MotorRecord:
         await self._show_place()
         await self._follow_place()
         await self._show_limits()
+        await self._judge_place()
 
     async def _put_offset(self, value: float) -> None:
         await self._set(OFF=value)
@@ -381,40 +457,98 @@ class MotorRecord:
             await self._put_offset(user - self._sign * self._number("DVAL"))
 
     async def _put_resolution(self, value: float) -> None:
-        if not value:
+        """Another MRES. Rates and limits stay what they are in steps, as in motor records since R7-3."""
+        if abs(value) < 1 / LARGEST:
             raise PutFailed("a resolution of 0 is no resolution")
-        self._tuned = False
-        await self._set(MRES=value, RRES=value, ERES=value, UREV=abs(value) * self._number("SREV"))
+        if self.fields["MOVN"]:
+            raise PutFailed("it moves: stop it first")
+        ratio = abs(value / self._number("MRES"))
+        speeds = {name: self._number(name) * ratio for name in ("VELO", "VBAS", "VMAX", "ACCS", "JVEL")}
+        low, high = sorted(self._number(name) * value for name in ("RLLM", "RHLM"))
+        self._locked *= ratio
+        self._good |= {name: speeds[name] for name in SPEEDS if name in speeds}
+        await self._set(MRES=value, RRES=value, ERES=value, UREV=abs(value) * self._number("SREV"), **speeds)
+        await self._set(DLLM=low, DHLM=high)
+        await self._show_limits()
         await self._show_place()
         await self._follow_place()
+        await self._judge_place()
 
     async def _put_limit(self, value: float, *, high: bool) -> None:
         """A user limit is the other dial limit where the directions differ."""
         dial = (value - self._number("OFF")) * self._sign
-        await self._show_limits(**{"DHLM" if high == (self._sign > 0) else "DLLM": dial})
+        await self._put_limits(**{"high" if high == (self._sign > 0) else "low": dial})
 
-    async def _show_limits(self, **dial: float) -> None:
-        await self._set(**dial)
-        ends = [self._user(self._number("DLLM")), self._user(self._number("DHLM"))]
-        low, high = ends if self._sign > 0 else ends[::-1]
-        await self._set(HLM=high, LLM=low)
+    async def _put_raw_limit(self, value: float, *, high: bool) -> None:
+        dial = value * self._number("MRES")
+        await self._put_limits(**{"high" if high == (self._number("MRES") > 0) else "low": dial})
+
+    async def _put_limits(self, low: float | None = None, high: float | None = None) -> None:
+        """Another dial limit. A motion that would go beyond it is stopped, and its put fails."""
+        low = self._number("DLLM") if low is None else low
+        high = self._number("DHLM") if high is None else high
+        if low > high:
+            raise PutFailed(f"the low limit {low:g} lies above the high limit {high:g}: put that one first")
+        await self._set(DLLM=low, DHLM=high)
+        await self._show_limits()
+        if self.fields["MOVN"] and self._bound is not None and not self._stop:
+            over = self._beyond(self._bound)
+            await self._set(LVIO=int(over))
+            if over:
+                self._why = "the limits moved, and where it was to go lies beyond them"
+                self._wanted = 0
+                self._stop = True
+        else:
+            await self._judge_place()
+
+    async def _judge_place(self) -> None:
+        """LVIO is whether the axis stands beyond a limit, by more than a step."""
+        here, step = self._number("DRBV"), abs(self._number("MRES"))
+        low, high = self._number("DLLM"), self._number("DHLM")
+        await self._set(LVIO=int(self._limited and not low - step <= here <= high + step))
+
+    async def _show_limits(self) -> None:
+        low, high = self._number("DLLM"), self._number("DHLM")
+        raw = sorted(end / self._number("MRES") for end in (low, high))
+        user = sorted(self._user(end) for end in (low, high))
+        await self._set(HLM=user[1], LLM=user[0], RHLM=raw[1], RLLM=raw[0])
 
     def _speed(self, field: str) -> Callable[[float], Awaitable[None]]:
+        """What a put to one of `SPEEDS` does. If the unit refuses it, all are what they were."""
+
         async def put(value: float) -> None:
-            least = self._number("VBAS") if field == "VELO" else 0.0
-            most = self._number("VMAX") if field in ("VELO", "VBAS") else 0.0
-            value = max(value, least)
-            await self._set(**{field: min(value, most) if most else value})
+            old = {name: self.fields[name] for name in SPEEDS}
+            locked = self._locked
+            await self._set(**self._with_speed(field, value))
             self._tuned = False
-            if self._one.locked():
+            if self.fields["MOVN"]:
                 return  # the next motion has it
             async with self._one:
                 try:
                     await self._tune()
                 except (DriverError, OSError, ValueError) as error:
+                    self._tuned, self._locked = False, locked
+                    await self._set(**old)
                     raise PutFailed(str(error)) from error
 
         return put
+
+    def _with_speed(self, field: str, value: float) -> dict[str, Value]:
+        """All of `SPEEDS` after a put: velocities within VBAS and VMAX, and one acceleration, of two that are kept."""
+        new = {name: self._number(name) for name in SPEEDS} | {field: value}
+        if field in ("ACCL", "ACCS"):
+            new["ACCU"] = ACCS if field == "ACCS" else ACCL
+        if (field in ("ACCS", "VMAX", "VELO", "VBAS") and not value >= 0) or (field == "ACCS" and not value):
+            raise PutFailed(f"{value:g} is too little")
+        if new["VMAX"]:
+            new["VBAS"], new["VELO"] = min(new["VBAS"], new["VMAX"]), min(new["VELO"], new["VMAX"])
+        new["VELO"] = max(new["VELO"], new["VBAS"])
+        if field in ("ACCS", "ACCU"):
+            self._locked = new["ACCS"]
+        if new["ACCU"] == ACCS and self._locked:
+            new["ACCL"] = new["VELO"] / self._locked
+        new["ACCS"] = new["VELO"] / new["ACCL"] if new["ACCL"] > 0 else 0.0
+        return {**new, "ACCU": int(new["ACCU"])}
 
     def _speeds(self) -> Speeds:
         step = abs(self._number("MRES"))
@@ -423,10 +557,16 @@ class MotorRecord:
     async def _tune(self) -> None:
         """Give the motor its speeds, and show what it makes of them."""
         if not self._tuned:
-            made = await self._motor.set_speeds(self._speeds())
+            try:
+                made = await self._motor.set_speeds(self._speeds())
+            except ValueError:
+                await self._set(**self._good)  # what it cannot do does not stay
+                raise
             step = abs(self._number("MRES"))
             self._tuned = True
-            await self._set(VBAS=made.start * step, VELO=made.slew * step, ACCL=made.seconds)
+            slope = made.slew * step / made.seconds if made.seconds else 0.0
+            await self._set(VBAS=made.start * step, VELO=made.slew * step, ACCL=made.seconds, ACCS=slope)
+            self._good = {name: self.fields[name] for name in SPEEDS}
 
     async def _put_sync(self, on: float) -> None:
         """Where the motor is, is where it should be."""
@@ -467,9 +607,25 @@ class MotorRecord:
     def _user(self, dial: float) -> float:
         return dial * self._sign + self._number("OFF")
 
+    def _whole(self, field: str) -> int:
+        return int(self._number(field))
+
+    @property
+    def _limited(self) -> bool:
+        """Both limits at 0 are none."""
+        return bool(self.fields["DLLM"] or self.fields["DHLM"])
+
     def _beyond(self, dial: float) -> bool:
+        """Whether it is outside the limits, by more than a number that is written in digits may differ from one."""
         low, high = self._number("DLLM"), self._number("DHLM")
-        return low < high and not low <= dial <= high
+        slack = abs(self._number("MRES")) * 1e-6
+        return self._limited and not low - slack <= dial <= high + slack
+
+    def _inside(self, limit: float, step: float) -> int:
+        """The last whole step that is not beyond the limit, high or low."""
+        raw = round(limit / step)
+        inwards = 1 if (limit == self._number("DLLM")) == (step > 0) else -1
+        return raw + inwards if self._beyond(raw * step) else raw
 
     async def _set(self, **values: Value) -> None:
         for field, value in values.items():

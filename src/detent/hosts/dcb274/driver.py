@@ -16,6 +16,7 @@ class Dcb274(Memory):
     `home_rate` is the rate at which `home` searches: the manual's example by default (page 38).
     """
 
+    fastest = FASTEST
     home_rate: float = 1000.0
 
     @operation

@@ -34,6 +34,7 @@ class GenStepper(Commands):
     After `run_at` the run rate that moves had before is set again by the next move.
     """
 
+    fastest = RATES[-1]
     _target: int | None = None  # where the move under way should end
     _times_told = 0  # how often this driver has told the motor to do something else
     _keep: int | None = None  # K, where it is known

@@ -30,6 +30,7 @@ class GsC200(Commands):
         super().forget()
         self._top = 0
 
+    fastest = 10 * language.RATES[-1]  # S and T are 10 to 10000 steps/s
     _slew = 0  # tens of steps/s that moves are wanted at; 0: as the module has it
     _top = 0  # tens of steps/s that T was last set to; 0: not known
 
