@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 
 DISTRIBUTION = "detent-motion"
 
-EXTRAS = {"epics": "caproto", "fast": "numba", "figures": "matplotlib", "workbench": "nicegui"}
+EXTRAS = {
+    "distributed": "distributed", "epics": "caproto", "fast": "numba", "figures": "matplotlib", "workbench": "nicegui",
+}  # fmt: skip
 """Each extra, and the module that is there when it is installed."""
 
 

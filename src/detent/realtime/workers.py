@@ -1,0 +1,125 @@
+"""Work divided over processes and machines by dask.distributed: the jobs of a map, the rows of a batch.
+
+What a piece answers hangs on the piece alone, so that the answers are those of one process, whoever does which, and
+also when a worker is lost: what it had is done again. Pieces are put together until they take `CHUNK` seconds: smaller
+ones cost more to carry about than to do.
+"""
+
+import logging
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from time import perf_counter
+from typing import Any, NamedTuple, Self, TypeVar
+
+from detent.extras import need
+
+CHUNK = 0.25  # s, of one worker
+AT_FIRST = 4  # pieces in a chunk while nobody knows how long one takes
+MOST = 512
+AHEAD = 3  # chunks for each worker that are on their way
+STARTED = 60.0  # s until the first worker must be there
+
+ONE_THREAD = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+Piece = TypeVar("Piece")
+Result = TypeVar("Result")
+
+
+class WorkersLost(RuntimeError):
+    """There is nobody to do the work, or a piece of it kills whoever does it. The text says what to do."""
+
+
+class _Done(NamedTuple):
+    """The answers of a chunk, and how long they took."""
+
+    answers: list[Any]
+    seconds: float
+
+
+class Workers:
+    """Workers of a scheduler, or `count` processes of this machine. Closed, those processes are gone.
+
+    Raises MissingExtra without dask.distributed, WorkersLost where nobody answers.
+    """
+
+    def __init__(self, count: int = 0, scheduler: str = "", *, patience: float = STARTED) -> None:
+        """`count` 0 is one for each processor. `patience`: seconds until the first must be there."""
+        need("distributed", "work on several processes or machines needs")
+        import distributed
+
+        self._cluster: Any = None
+        self._client: Any = None
+        local: Any = distributed.LocalCluster
+        make: Any = distributed.Client
+        try:
+            if not scheduler:
+                self._cluster = local(
+                    n_workers=count or os.cpu_count() or 1, threads_per_worker=1, processes=True,
+                    dashboard_address=None, host="127.0.0.1", env=ONE_THREAD, silence_logs=logging.CRITICAL,
+                )  # fmt: skip
+            self._client = make(self._cluster or scheduler, timeout=patience, set_as_default=False)
+            self._client.wait_for_workers(1, timeout=patience)
+        except (OSError, TimeoutError) as error:
+            where = f"--scheduler {scheduler}" if scheduler else "the workers of this machine"
+            self.close()
+            raise WorkersLost(f"{where}: nobody answers: {error or 'no worker'}") from None
+
+    def count(self) -> int:
+        """How many workers there are now."""
+        return len(self._client.nthreads())
+
+    def names(self) -> Mapping[str, int]:
+        """Their addresses, and the process of each."""
+        return dict(self._client.run(os.getpid))
+
+    def map(
+        self, do: Callable[[Any, list[Piece]], list[Result]], shared: Any, pieces: Sequence[Piece],
+        *, chunk: int | None = None,
+    ) -> Iterator[Result]:  # fmt: skip
+        """`do(shared, [piece, ...])` for all of `pieces`: the results in their order, as they come.
+
+        `chunk` is how many pieces go together; by default as many as take a quarter of a second. What `do` raises is
+        raised here. Both must be picklable, as are functions of modules.
+        """
+        from distributed import KilledWorker
+
+        [carried] = self._client.scatter([shared], broadcast=True, hash=False)
+        size, at = chunk or AT_FIRST, 0
+        waiting: list[Any] = []
+        try:
+            while at < len(pieces) or waiting:
+                while at < len(pieces) and len(waiting) < AHEAD * max(self.count(), 1):
+                    some = list(pieces[at : at + size])
+                    waiting.append(self._client.submit(_timed, do, carried, some, pure=False))
+                    at += len(some)
+                done: _Done = waiting.pop(0).result()
+                yield from done.answers
+                if chunk is None and done.answers:
+                    each = max(done.seconds / len(done.answers), 1e-6)
+                    size = min(max(round(CHUNK / each), 1), 2 * size, MOST)
+        except KilledWorker as error:
+            raise WorkersLost(
+                f"a piece of the work was given to several workers, and each was lost with it ({error}). Memory, "
+                "perhaps: look at their output, and take fewer workers"
+            ) from None
+        finally:
+            self._client.cancel(waiting)
+
+    def close(self) -> None:
+        """Let them go; local ones end."""
+        for one in (self._client, self._cluster):
+            if one is not None:
+                one.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _timed(do: Callable[[Any, list[Any]], list[Any]], shared: Any, pieces: list[Any]) -> _Done:
+    """A chunk of work, in the worker."""
+    began = perf_counter()
+    answers = do(shared, pieces)
+    return _Done(answers, perf_counter() - began)

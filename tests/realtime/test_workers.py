@@ -1,0 +1,78 @@
+"""Work on several processes: the answers are those of one, in their order, also when a worker is killed."""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from detent.motors.drive import Drive
+from detent.motors.load import Load
+from detent.motors.named import motor
+from detent.motors.rotor import Rig
+from detent.motors.variants import SPREAD, Ensemble, draws
+from detent.motors.winding import HALF
+from detent.ramps.constant_acceleration import move
+
+pytest.importorskip("distributed")
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
+
+RIG = Rig(motor("qsh4218-41-10-035"), Drive(24, 1.0, HALF), Load(inertia=1.5e-5, friction=0.02))
+POINTS = [(slew, ramp) for slew in range(2000, 8000, 500) for ramp in range(20, 220, 20)]
+
+
+def lost(rig: Rig, points: list[tuple[int, int]]) -> list[tuple[int, ...]]:
+    """Which of 32 variants lose a step with each of these slew speeds and ramps."""
+    many = Ensemble(rig, draws(SPREAD.of(rig), 32, seed=3))
+    found = []
+    for slew, ramp in points:
+        outcomes = many.judge(move(500, slew, ramp, 600).train)
+        found.append(tuple(int(k) for k in outcomes.lost.nonzero()[0]))
+    return found
+
+
+@pytest.fixture(scope="module")
+def workers() -> Iterator[Any]:
+    import cloudpickle
+
+    from detent.realtime.workers import Workers
+
+    cloudpickle.register_pickle_by_value(sys.modules[__name__])
+    with Workers(2) as found:
+        yield found
+    cloudpickle.unregister_pickle_by_value(sys.modules[__name__])
+
+
+def test_the_answers_are_those_of_one_process(workers: Any) -> None:
+    alone = lost(RIG, POINTS)
+    assert any(alone)
+    assert not all(alone)
+    assert list(workers.map(lost, RIG, POINTS)) == alone
+    assert list(workers.map(lost, RIG, POINTS, chunk=7)) == alone
+
+
+def test_also_when_a_worker_is_killed(workers: Any) -> None:
+    answers = workers.map(lost, RIG, POINTS, chunk=5)
+    found = [next(answers)]
+    os.kill(next(iter(workers.names().values())), signal.SIGKILL)
+    found += answers
+    assert found == lost(RIG, POINTS)
+
+
+def test_what_fails_in_a_worker_is_raised_here(workers: Any) -> None:
+    with pytest.raises(ZeroDivisionError):
+        list(workers.map(lambda _, pieces: [1 // piece for piece in pieces], None, [1, 0]))
+
+
+def test_a_worker_has_one_thread(workers: Any) -> None:
+    assert list(workers.map(lambda _, pieces: [os.environ["NUMBA_NUM_THREADS"] for _ in pieces], None, [1])) == ["1"]
+    assert set(workers._client.nthreads().values()) == {1}
+
+
+def test_nobody_at_the_address() -> None:
+    from detent.realtime.workers import Workers, WorkersLost
+
+    with pytest.raises(WorkersLost, match=r"--scheduler tcp://127.0.0.1:1: nobody answers"):
+        Workers(scheduler="tcp://127.0.0.1:1", patience=1)
