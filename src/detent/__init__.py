@@ -20,3 +20,8 @@ def __getattr__(name: str) -> object:
 
         return getattr(ways, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """What is there, `connect` and `connect_async` before their first use, too."""
+    return sorted({*globals(), *__all__})

@@ -134,7 +134,7 @@ def test_a_file_that_cannot_be_read_is_status_2(
     verb: Callable[..., None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert status(lambda: verb("gs-c200", tmp_path / "none")) == 2
-    assert capsys.readouterr().err == f"{tmp_path / 'none'}: No such file or directory\n"
+    assert capsys.readouterr().err == f"detent: {tmp_path / 'none'}: No such file or directory\n"
 
 
 def test_files_of_the_wrong_kind_are_told_apart(source: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,7 +3,8 @@
 import subprocess
 import sys
 from importlib import import_module
-from inspect import getdoc
+from inspect import getdoc, signature
+from pathlib import Path
 
 import pytest
 
@@ -46,3 +47,17 @@ def test_help_imports_neither_numpy_nor_the_controllers() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_help_shows_every_default_that_says_something(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    place, _ = VERBS[name]
+    module, function = place.split(":")
+    assert status(name, "--help") == 0
+    shown = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    for parameter in signature(getattr(import_module(module), function)).parameters.values():
+        default = parameter.default
+        if isinstance(default, bool) or not isinstance(default, (str, int, float, Path)) or default in ("", 0):
+            continue
+        told = f"{default:g}" if isinstance(default, float) else str(default)
+        assert f"[default: {told}]" in shown, parameter.name

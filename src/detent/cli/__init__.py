@@ -16,6 +16,7 @@ ASKED_WRONGLY = 2
 
 VERBS = {
     "demo": ("detent.cli.demo:demo", "Run an example cell, tell what happens, and draw it."),
+    "examples": ("detent.cli.examples:examples", "List the examples, or copy one into a folder of yours."),
     "models": ("detent.cli.models:models", "List the controllers, or show one with all its tables."),
     "workbench": ("detent.cli.workbench:workbench", "Show a controller or a cell in a browser, running in real time."),
     "serve": ("detent.cli.serve:serve", "Serve a controller or a cell in real time, until Ctrl-C."),
@@ -55,16 +56,24 @@ def application(asked: str = "") -> "App":
         name="detent",
         help=TITLE,
         version=detent.__version__,
-        default_parameter=Parameter(negative=(), show_default=False),
+        default_parameter=Parameter(negative=(), show_default=_default),
         exit_on_error=False,
-        print_error=True,
+        print_error=False,
     )
     for place, (name, (function, line)) in enumerate(VERBS.items()):
         # A help text given here would replace the function's own, which the verb's --help shows whole.
         short = {} if asked in (name, "*") else {"help": line}
         app.command(function, name=name, sort_key=place, **short)
-    app.register_install_completion_command()
+    line = "Write the script that completes detent in your shell."
+    app.command("detent.cli.completing:install", name="--install-completion", help=line)
     return app
+
+
+def _default(value: object) -> str | None:
+    """A default as help shows it; nothing for one that says nothing."""
+    if value is None or value is False or value in ("", (), [], {}):
+        return None
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def main(tokens: Sequence[str] | None = None) -> None:
@@ -87,7 +96,10 @@ def main(tokens: Sequence[str] | None = None) -> None:
     before = _hear_termination()
     try:
         application(given[0] if given else "")(given)
-    except CycloptsError:
+    except CycloptsError as error:
+        verb = given[0] if given and given[0] in VERBS else ""
+        told = " ".join(str(error).split()) or "this cannot be read"
+        print(f"detent: {told} See: detent {verb} --help".replace("  ", " "), file=sys.stderr)
         sys.exit(ASKED_WRONGLY)
     except MissingExtra as error:
         print(f"detent: {error}", file=sys.stderr)

@@ -146,7 +146,8 @@ def _assembly(model: str, file: Path, json: bool) -> Assembly[Any]:
         if json:
             errors = [{"file": failed.name, **error._asdict()} for error in failed.errors]
             _print_json({"model": model, "errors": errors})
-        raise _asked_wrongly(str(failed)) from failed
+        print(failed, file=sys.stderr)  # FILE:LINE:COLUMN, as compilers tell it and editors find it
+        raise SystemExit(ASKED_WRONGLY) from failed
 
 
 def _formatted(assembly: Assembly[Any], format: str) -> bytes:
@@ -211,11 +212,11 @@ def _write(file: Path, data: bytes) -> None:
     try:
         write_whole(file, data)
     except OSError as error:
-        print(f"{file}: not written: {error.strerror or error}", file=sys.stderr)
+        print(f"detent: {file}: not written: {error.strerror or error}", file=sys.stderr)
         raise SystemExit(FAILED) from error
 
 
 def _asked_wrongly(message: str) -> SystemExit:
     """The way out after a request that cannot be met; `message` has gone to stderr."""
-    print(message, file=sys.stderr)
+    print(f"detent: {message}", file=sys.stderr)
     return SystemExit(ASKED_WRONGLY)

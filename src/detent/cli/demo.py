@@ -12,16 +12,19 @@ if TYPE_CHECKING:
     from detent.cell.description import Description
     from detent.outputs.figures import Pin
 
-TITLES = {"drilling": "two GS-C200 modules, cross-wired, drill five holes in a bar (datasheet, example 2)"}
+TOLD = "drilling"  # the example whose story is told
+LONGEST = 20  # seconds of the others: some of them run for ever
 
 
 def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bool = False) -> None:
     """Run an example cell, tell what happens, and draw it.
 
+    `detent examples` lists them.
+
     Parameters
     ----------
     name
-        Which example: drilling.
+        Which example.
     output
         The folder for the figure and the waveforms; made if it is not there.
     json
@@ -29,19 +32,21 @@ def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bo
     """
     from detent.cell.build import build
     from detent.cli import outcome
-    from detent.cli.target import asked_wrongly, failed, target
-    from detent.controllers.catalogue import unknown
+    from detent.cli.examples import place as example
+    from detent.cli.target import failed, target
     from detent.outputs.figures import check
+    from detent.ticks import SECOND
 
-    if name not in TITLES:
-        asked_wrongly(unknown("example", name, tuple(TITLES)))
+    place = example(name) / "cell.toml"
     check(output / f"{name}.png")
-    place = examples() / name / "cell.toml"
     found = target(str(place))
     cell = build(found.description, found.read)
-    while cell.step() is not None:
-        pass
-    told = list(_story(cell, found.description, _comments(found.description, found.read)))
+    until = LONGEST * SECOND
+    while (at := cell.next_event()) is not None and (name == TOLD or at <= until):
+        cell.step()
+    if name != TOLD:
+        cell.run_to(max(cell.now, min(until, cell.now + SECOND // 10)))
+    told = list(_story(cell, found.description, _comments(found.description, found.read))) if name == TOLD else []
     try:
         files = _draw(cell, found.description, output, name)
     except OSError as error:
@@ -51,15 +56,11 @@ def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bo
         facts = {**outcome.facts(outcome.quiet(cell)), "files": {kind: str(path) for kind, path in files.items()}}
         print(json_text.dumps({"demo": name, **facts, "timeline": story}))
         return
-    _print_story(found.description, told)
+    if name == TOLD:
+        _print_story(found.description, told)
+    else:
+        print(found.description.title)
     _print_end(cell, told, files, place)
-
-
-def examples() -> Path:
-    """The examples: beside an installed package, or in the project's own folder."""
-    package = Path(__file__).parents[1]
-    installed = package / "examples"
-    return installed if installed.is_dir() else package.parents[1] / "examples"
 
 
 class Told(NamedTuple):
@@ -119,8 +120,10 @@ def _draw(cell: "Cell", description: "Description", folder: Path, name: str) -> 
     files = {"figure": folder / f"{name}.png", "waveforms": folder / f"{name}.vcd"}
     seen = signals.of_cell(cell)
     vcd.write(files["waveforms"], seen)
-    programs = [lane for lane in figures.chosen_lanes(seen) if isinstance(lane, figures.Strip)]
-    figures.write(files["figure"], seen, title=description.title, lanes=[*programs, *_handshake()])
+    lanes: list[figures.Pin | figures.Strip] | None = None
+    if name == TOLD:
+        lanes = [*(lane for lane in figures.chosen_lanes(seen) if isinstance(lane, figures.Strip)), *_handshake()]
+    figures.write(files["figure"], seen, title=description.title, lanes=lanes)
     return files
 
 
@@ -165,16 +168,18 @@ def _print_end(cell: "Cell", told: list[Told], files: Mapping[str, Path], place:
     from detent.cli import outcome
     from detent.ticks import SECOND
 
-    holes = sum(line.unit == "drill" and line.instruction == "G0" for line in told)
-    cut = next(line.at_ns for line in told if line.unit == "bar" and line.instruction == "A1")
-    print(f"\n{holes} holes drilled, the bar cut off at {cut / SECOND:.3f} s.\n")
+    print()
+    if told:
+        holes = sum(line.unit == "drill" and line.instruction == "G0" for line in told)
+        cut = next(line.at_ns for line in told if line.unit == "bar" and line.instruction == "A1")
+        print(f"{holes} holes drilled, the bar cut off at {cut / SECOND:.3f} s.\n")
     outcome.show(outcome.quiet(cell), [])
     shown = place.relative_to(Path.cwd()) if place.is_relative_to(Path.cwd()) else place
     print()
     print(f"Look at   {files['figure']}   with any viewer of pictures: positions, speeds, handshake")
     print(f"     and  {files['waveforms']}   with gtkwave or PulseView: every pin, every pulse, to the nanosecond")
     print("Watch it run in a browser, or serve it to host programs, with a serial port for each unit:")
-    print(f"    {_called()} workbench")
+    print(f"    {_called()} workbench" + ("" if told else f" {shown}"))
     print(f"    {_called()} serve {shown}")
 
 

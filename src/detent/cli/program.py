@@ -1,6 +1,7 @@
 """The verbs `upload`, `download` and `compare`: program source, and the program memory of a unit."""
 
 import json as json_text
+import sys
 from collections.abc import Callable, Sequence
 from difflib import unified_diff
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast
 from cyclopts import Parameter
 
 from detent.assembler import Assembly, AssemblyFailed, Language, assemble, disassemble
-from detent.cli import FAILED
+from detent.cli import ASKED_WRONGLY, FAILED
 from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
 
 if TYPE_CHECKING:
@@ -201,7 +202,8 @@ def _assembled(model: str, file: Path) -> Assembly[Any]:
     try:
         return assemble(language, source, str(file))
     except AssemblyFailed as error:
-        asked_wrongly(error)
+        print(error, file=sys.stderr)  # FILE:LINE:COLUMN, as compilers tell it and editors find it
+        raise SystemExit(ASKED_WRONGLY) from error
 
 
 def _programmed(unit: "Blocking") -> Programmed:

@@ -80,7 +80,7 @@ def workbench(
         Print one line of JSON once everything is ready, and nothing else.
     """
     from detent.cell.description import Problem
-    from detent.cli.demo import examples
+    from detent.cli.examples import home
     from detent.cli.serve import asked_endpoints
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
@@ -91,7 +91,7 @@ def workbench(
     if target is None and links:  # `workbench --pty gs-c200`: what follows --pty was meant to be shown
         target, links = str(links[0]), []
     own = Path(target).parent if target is not None and _is_file(target) else Path()
-    shown = target if target is not None else str(examples() / FIRST)
+    shown = target if target is not None else str(home() / FIRST)
     kept = state if state is not None else default_folder()
     try:
         need("workbench", "the workbench needs")

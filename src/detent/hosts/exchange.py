@@ -14,8 +14,24 @@ lives in the virtual time of a cell.
 
 from collections.abc import Callable, Coroutine, Generator
 from contextlib import AbstractAsyncContextManager, AbstractContextManager, AsyncExitStack, ExitStack, closing
-from functools import partial, update_wrapper
-from typing import Any, Concatenate, Final, Generic, NamedTuple, ParamSpec, Protocol, Self, TypeAlias, TypeVar, overload
+from functools import cached_property, partial, update_wrapper
+from inspect import Signature, signature
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Concatenate,
+    Final,
+    Generic,
+    NamedTuple,
+    ParamSpec,
+    Protocol,
+    Self,
+    TypeAlias,
+    TypeVar,
+    cast,
+    get_args,
+    overload,
+)
 
 from detent.hosts.errors import ECHOES, BadAnswer, DriverError, NoAnswer, PortLost, Spoken
 
@@ -184,10 +200,12 @@ class _Shell:
     def __init__(self, driver: Driver, watch: Watch | None = None) -> None:
         self.driver, self.watch = driver, watch
 
-    def __getattr__(self, name: str) -> Any:  # called only for what is neither the shell's nor an operation
-        if name == "driver":
-            raise AttributeError(name)
-        return getattr(self.driver, name)
+    if not TYPE_CHECKING:  # a checker sees what the driver's class has: a misspelt name is an error to it
+
+        def __getattr__(self, name: str) -> Any:  # called only for what is neither the shell's nor an operation
+            if name == "driver":
+                raise AttributeError(name)
+            return getattr(self.driver, name)
 
     def _lost(self, error: OSError) -> PortLost:
         self.driver.forget()
@@ -380,9 +398,21 @@ class Operation(Generic[P, T]):
         method = self._method
 
         def call(*given: P.args, **named: P.kwargs) -> Any:
-            return unit.perform(method(unit.driver, *given, **named))
+            return cast("Blocking | Asynchronous", unit).perform(method(unit.driver, *given, **named))
 
-        return update_wrapper(call, method)
+        update_wrapper(call, method)
+        call.__signature__ = self.signature  # type: ignore[attr-defined]
+        return call
+
+    @cached_property
+    def signature(self) -> Signature:
+        """What a shell's call takes and returns: without the driver, and with the result in place of the steps."""
+        found = signature(self._method)
+        result = get_args(found.return_annotation)
+        return found.replace(
+            parameters=list(found.parameters.values())[1:],
+            return_annotation=result[-1] if len(result) == 3 else found.return_annotation,
+        )
 
 
 def operation(method: Callable[Concatenate[Any, P], Steps[T]]) -> Operation[P, T]:

@@ -134,6 +134,7 @@ def connect(model: str, port: str | Port, **options: Any) -> Any:
     from detent.realtime.ports import open_port
 
     found = host(model)
+    _see_port(port)
     form, watch = _line(found, options)
     driver = found.make(model, form.baud, options)
     shell = found.shell("Blocking")
@@ -163,10 +164,22 @@ async def connect_async(model: str, port: str | AsyncPort, **options: Any) -> An
     from detent.realtime.async_ports import open_async_port
 
     found = host(model)
+    _see_port(port)
     form, watch = _line(found, options)
     driver = found.make(model, form.baud, options)
     shell = found.shell("Async")
     return shell(driver, await open_async_port(port, **form._asdict()) if isinstance(port, str) else port, watch)
+
+
+def _see_port(port: object) -> None:
+    """Raise ValueError for what is no port, before it fails in the middle of a call."""
+    if isinstance(port, str) or all(hasattr(port, name) for name in ("write", "receive", "keep", "turn")):
+        return
+    rate = f"; a rate is named, baud={port}" if isinstance(port, int) else ""
+    raise ValueError(
+        "a port is a serial device like /dev/ttyUSB0, HOST:PORT, rfc2217://HOST:PORT, or the port of another driver, "
+        f"not {port!r}{rate}"
+    )
 
 
 def _line(found: Host, options: dict[str, Any]) -> tuple[Format, Watch | None]:

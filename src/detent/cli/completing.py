@@ -1,0 +1,133 @@
+"""What a shell completes beyond the options: models, motors, straps, control verbs, the names of examples.
+
+The script is made once, from the choices that a parameter's type has. Those that are tables of Detent's stand in the
+types only while it is made: importing a verb must not bring the tables with it.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, get_args
+
+from detent.cli import VERBS
+
+
+def models() -> list[str]:
+    """The controllers by name."""
+    from detent.controllers.catalogue import MODELS
+
+    return list(MODELS)
+
+
+def motors() -> list[str]:
+    """The motors by name."""
+    from detent.motors.named import MOTORS
+
+    return list(MOTORS)
+
+
+def wired_motors() -> list[str]:
+    """The motors of the manual's examples."""
+    from detent.controllers.genstepper.motors import EXAMPLES
+
+    return [one.number for one in EXAMPLES]
+
+
+def straps() -> list[str]:
+    """Each strap of each controller, as it is begun: ``CHS=``."""
+    from detent.controllers.catalogue import MODELS
+
+    return sorted({f"{strap}=" for model in MODELS.values() for strap in model.straps})
+
+
+def settings() -> list[str]:
+    """Each option of each controller, as it is begun."""
+    from detent.controllers.catalogue import MODELS
+
+    return sorted({f"{option.name}=" for model in MODELS.values() for option in model.options})
+
+
+def control_verbs() -> list[str]:
+    """What a served cell can be told."""
+    from detent.realtime.verbs import VERBS as KNOWN
+
+    return list(KNOWN)
+
+
+def example_names() -> list[str]:
+    """The examples."""
+    from detent.cli.examples import names
+
+    return names()
+
+
+def pages() -> list[str]:
+    """The pages of `detent size`."""
+    from detent.cli.size import PAGES
+
+    return list(PAGES)
+
+
+KNOWN: Final[dict[tuple[str, str], Callable[[], list[str]]]] = {
+    **{(verb, "model"): models for verb in VERBS},
+    **{(verb, "target"): models for verb in VERBS},
+    **{(verb, "strap"): straps for verb in VERBS},
+    **{(verb, "set_"): settings for verb in VERBS},
+    ("motor", "name"): motors,
+    ("wiring", "motor"): wired_motors,
+    ("control", "words"): control_verbs,
+    ("demo", "name"): example_names,
+    ("examples", "name"): example_names,
+    ("size", "page"): pages,
+}
+"""The words for a parameter of a verb."""
+
+
+@contextmanager
+def with_choices() -> Iterator[None]:
+    """The verbs' parameters have their words as types while this lasts."""
+    changed: list[tuple[Any, dict[str, Any]]] = []
+    try:
+        for verb, (place, _) in VERBS.items():
+            module, name = place.split(":")
+            function = getattr(import_module(module), name)
+            changed.append((function, dict(function.__annotations__)))
+            for parameter in function.__annotations__:
+                words = KNOWN.get((verb, parameter))
+                if words is not None:
+                    one: Any = Literal.__getitem__(tuple(words()))
+                    several = parameter in ("strap", "set_", "model") and verb in ("serve", "run", "workbench", "find")
+                    kept = get_args(function.__annotations__[parameter])[1:]  # what Annotated says of it
+                    kind: Any = Sequence[one] if several else one
+                    function.__annotations__[parameter] = Annotated[(kind, *kept)] if kept else kind
+        yield
+    finally:
+        for function, before in changed:
+            function.__annotations__ = before
+
+
+def install(*, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path | None = None) -> None:
+    """Write the script that completes detent in your shell.
+
+    Your shell reads it when it starts the next time.
+
+    Parameters
+    ----------
+    shell
+        Which shell; without it the one that runs.
+    output
+        Write the script to this file, and change nothing else.
+    """
+    from detent.cli import application
+    from detent.cli.endings import asked_wrongly, failed
+
+    try:
+        with with_choices():
+            whole = application("*")
+            written = whole.install_completion(shell=shell, output=output, add_to_startup=output is None)
+    except OSError as error:
+        failed(f"{error.filename or output}: not written: {error.strerror or error}")
+    except (ValueError, RuntimeError) as error:
+        asked_wrongly(f"{error}: say --shell bash, zsh or fish")
+    print(f"Wrote {written}" + ("" if output is not None else "; open a new shell"))
