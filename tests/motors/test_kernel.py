@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.motors.moves import SMALL, even, ramped, rig
 
-from detent.motors import engine, kernel
+from detent.motors import engine, gpu, kernel
 from detent.motors.drive import Drive
 from detent.motors.excitation import Sequencer
 from detent.motors.motor import MotorError
@@ -156,3 +156,50 @@ def test_the_kernel_is_a_thread_of_a_gpu_in_the_cuda_simulator() -> None:
     if "No module named 'numba.cuda'" in done.stderr:
         pytest.skip("numba has no CUDA target here: install numba-cuda")
     assert done.stdout == "same\n", done.stderr
+
+
+MANY = """
+import numpy as np
+from dataclasses import replace
+from detent.motors import gpu
+from detent.motors.load import Load, Profile
+from detent.motors.variants import SPREAD, Ensemble, corners
+from tests.motors.moves import even, rig
+
+gpu.LEAST = 1
+steady = rig()
+changing = replace(steady, load=Load(5.4e-6, 0.02, torque_by_position=Profile(-1.0, 1.0, (0.0, 0.0, 0.2))))
+for one in (steady, changing):
+    some = Ensemble(one, corners(SPREAD.of(one))[:3])
+    for rate, steps in ((500, 5), (20000, 20)):
+        pulses = even(rate, steps)
+        gpu.use(False)
+        plain = some.judge(pulses, settle=2_000_000)
+        first = some.survives(pulses, settle=2_000_000)
+        gpu.use()
+        there = some.judge(pulses, settle=2_000_000)
+        for name, a, b in zip(plain._fields, plain, there):
+            assert np.array_equal(a, b), (name, a, b)
+        assert (some.survives(pulses, settle=2_000_000) is None) == (first is None)
+        print(int(there.lost.sum()))
+"""
+
+
+@compiled_only
+def test_variants_on_a_gpu_are_those_of_a_processor_in_the_cuda_simulator() -> None:
+    """A thread a variant, with a steady load and one that changes with the place; moves that are made, and lost."""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", MANY], capture_output=True, text=True, check=False,
+        env={**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
+    )  # fmt: skip
+    if "there is no GPU here" in done.stderr:
+        pytest.skip("numba has no CUDA target here: install numba-cuda")
+    assert done.returncode == 0, done.stderr
+    assert len(set(done.stdout.split())) > 1, done.stdout
+
+
+def test_no_gpu_is_one_clear_line() -> None:
+    if gpu.available():
+        pytest.skip("there is a GPU")
+    with pytest.raises(MotorError, match="there is no GPU here that numba sees"):
+        gpu.use()

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from detent.motors import chance, engine, kernel
+from detent.motors import chance, engine, gpu, kernel
 from detent.motors.excitation import Changes, Sequencer, joined
 from detent.motors.motor import MotorError
 from detent.motors.move import SETTLE, Pulses, Verdict, chunks_of, extent_of, judged, parts_of
@@ -320,7 +320,9 @@ def _outcomes(move: _Move, par: Floats, loads: Floats, substep: Ns, *, halt: boo
     rig, start = move.rig, move.start
     place, level = start.place, start.level
     rest = _rest(rig, par, loads, place, level)
-    if rig.load.is_steady and engine.fast():
+    if gpu.chosen(count):
+        state, place = _on_gpu(move, par, rest, loads, substep, halt)
+    elif rig.load.is_steady and engine.fast():
         state, place = _abreast(move, par, rest, substep, halt)
     else:
         state, place = _one_by_one(move, par, rest, loads, substep, halt)
@@ -408,6 +410,27 @@ def _one_by_one(move: _Move, par: Floats, rest: Floats, loads: Floats, substep: 
         if halt and found[7, k] >= 0:
             break
     return found, place
+
+
+def _on_gpu(move: _Move, par: Floats, rest: Floats, loads: Floats, substep: Ns, halt: bool) -> tuple[Floats, int]:
+    """The scalar kernel, a thread for each variant."""
+    from detent.motors.gpu_threads import Threads
+
+    rig, start, count = move.rig, move.start, par.shape[1]
+    s, n = np.zeros((count, kernel.FLOATS)), np.zeros((count, kernel.INTEGERS), np.int64)
+    s[:, : len(rest)], s[:, kernel.LEVEL] = rest.T, start.level
+    n[:, kernel.NOW], n[:, kernel.PLACE], n[:, kernel.MODE] = move.begin, start.place, start.mode
+    n[:, kernel.PULSED], n[:, kernel.GAP] = move.begin - kernel.LONG_AGO, kernel.LONG_AGO
+    n[:, kernel.FROM], n[:, kernel.LOST_PULSE] = start.place, -1
+    by_time, by_position = (loads[:, None] * profile for profile in (rig.by_time, rig.by_position))
+    threads = Threads(s, n, par.T, by_time, by_position, (rig.table_a, rig.table_b))
+    for changes, until in move.changes():
+        threads.advance(changes, until, substep)
+        if halt and (threads.state()[1][:, kernel.LOST_PULSE] >= 0).any():
+            break
+    s, n = threads.state()
+    found = np.vstack((s[:, : kernel.LEVEL].T, s[:, kernel.WORST], n[:, kernel.WORST_PULSE], n[:, kernel.LOST_PULSE]))
+    return found, int(n[0, kernel.PLACE])
 
 
 _NO_TRACE = np.zeros((0, kernel.COLUMNS))
