@@ -3,7 +3,6 @@
 import json as json_text
 import sys
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from errno import EILSEQ
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, cast
 from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
 
 if TYPE_CHECKING:
-    from detent.hosts.backups import Backup, Explain
+    from detent.hosts.backups import Backup
     from detent.hosts.exchange import Blocking
 
 
@@ -104,11 +103,13 @@ def restore(
     from detent.cli.unit import unit as connected
     from detent.hosts.backups import Backup, BackupError
     from detent.hosts.errors import DriverError
+    from detent.realtime.images import default_folder
+    from detent.workbench.units.backups import check_fits, file_before
 
     _keeps(model)
     try:
         wanted = Backup.parse(_text(file))
-        _fits(wanted.model, model)
+        check_fits(wanted.model, model)
         if json and not yes:
             raise BackupError("with --json nobody is asked: say --yes")
     except BackupError as error:
@@ -125,7 +126,7 @@ def restore(
         asked_wrongly("nobody can be asked here, and nothing was written: say --yes to write it")
     if not yes and input(f"Write {file} to the unit? [y/N] ").strip().lower() not in ("y", "yes"):
         failed("nothing was written")
-    before = _before(model)
+    before = file_before(model, default_folder())
     _write(before, there._replace(options=unit.written()))
     with progress(f"writing to the {model}") as watch, connected(model, port, unit, watch) as found:
         try:
@@ -165,21 +166,10 @@ def _keeps(model: str) -> None:
         asked_wrongly(error)
 
 
-def _fits(of: str, model: str) -> None:
-    """Raise BackupError if a backup `of` a model is not for `model`. Boards of one firmware take each other's."""
-    from detent.hosts.backups import BackupError
-    from detent.realtime.connect import HOSTS
-
-    if of != model and (HOSTS.get(of) is not HOSTS[model] or HOSTS[model].takes_model):
-        raise BackupError(f"it is the backup of a {of}, and this is a {model}")
-
-
 def _read(unit: "Blocking", model: str, port: str) -> "Backup":
-    from detent.hosts.backups import Backup
+    from detent.workbench.units.backups import backup_of
 
-    saved = cast("Keeper", unit).saved()
-    when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
-    return Backup(model, saved, f"What the {model} at {port} held on {when}.")
+    return backup_of(model, port, cast("Keeper", unit).saved())
 
 
 def _free(file: Path) -> Path:
@@ -194,8 +184,9 @@ def _free(file: Path) -> Path:
 def _write(file: Path, saved: "Backup") -> None:
     from detent.cli.target import failed
     from detent.outputs.files import write_whole
+    from detent.workbench.units.backups import explained
 
-    text = saved.text(_explain(saved.model))
+    text = saved.text(explained(saved.model))
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         write_whole(file, text.encode())
@@ -213,27 +204,6 @@ def _text(file: Path) -> str:
         if error.errno == EILSEQ:
             raise BackupError(f"it is no text file: {error.strerror}") from None
         raise BackupError(f"cannot read it: {error.strerror or error}") from None
-
-
-def _before(model: str) -> Path:
-    """A new file for what a unit held before a restore."""
-    from detent.realtime.images import default_folder
-
-    when = datetime.now(UTC).strftime("%Y%m%d-%H%M%S-%f")
-    return default_folder() / "before-restore" / f"{model}-{when}.toml"
-
-
-def _explain(model: str) -> "Explain":
-    """What the model's command table says of a line of a program, where it leaves no choice."""
-    from detent.workbench.words import words
-
-    known = words(model)  # the longest first
-
-    def explain(line: str) -> str:
-        rows = next((word.rows for word in known if line.startswith(word.spelling)), ())
-        return rows[0].what if len(rows) == 1 else ""
-
-    return explain
 
 
 def _contents(saved: "Backup") -> str:

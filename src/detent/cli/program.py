@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast
 
 from cyclopts import Parameter
 
-from detent.assembler import Assembly, AssemblyFailed, Language, assemble, disassemble
+from detent.assembler import Assembly, AssemblyFailed, Language, assemble
 from detent.cli import ASKED_WRONGLY, FAILED
 from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
 
@@ -62,9 +62,10 @@ def upload(
     """
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
+    from detent.workbench.units.programs import lines_of
 
     assembly = _assembled(model, file)
-    lines = _lines(assembly)
+    lines = lines_of(assembly)
     with progress(f"storing in the {model}") as watch, connected(model, port, unit, watch) as found:
         driver = _programmed(found)
         driver.write_program(lines)
@@ -111,6 +112,7 @@ def download(
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
     from detent.outputs.files import write_whole
+    from detent.workbench.units.programs import source_of
 
     if file is not None and output is not None:
         asked_wrongly(f"two files: {file} and --output {output}; say one")
@@ -120,7 +122,7 @@ def download(
     language = _language(model)
     with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
         lines = _programmed(found).read_program()
-    source = _source(language, lines)
+    source = source_of(language, lines)
     if file is not None:
         try:
             write_whole(file, source.encode())
@@ -163,11 +165,12 @@ def compare(
     """
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
+    from detent.workbench.units.programs import places_of, wanted_of
 
     assembly = _assembled(model, file)
     with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
-        there = _there(_programmed(found), assembly)
-    wanted = [f"{placed.address:4} {placed.text}" for placed in sorted(assembly.placed)]
+        there = found.perform(places_of(found.driver, assembly))
+    wanted = wanted_of(assembly)
     differences = list(unified_diff(there, wanted, "the unit", str(file), lineterm="", n=2))
     if json:
         print(json_text.dumps({"model": model, "port": port, "file": str(file), "differences": differences}))
@@ -208,47 +211,3 @@ def _assembled(model: str, file: Path) -> Assembly[Any]:
 
 def _programmed(unit: "Blocking") -> Programmed:
     return cast("Programmed", unit)
-
-
-def _origin(language: Language[Any]) -> Callable[[int], str] | None:
-    """How a language says where the next instruction stands, if its programs have places."""
-    found: Callable[[int], str] | None = getattr(language, "origin", None)
-    return found
-
-
-def _lines(assembly: Assembly[Any]) -> list[str]:
-    """The commands as the driver takes them; where programs have places, with the address of each."""
-    if _origin(assembly.language) is None:
-        return list(assembly.commands)
-    return [f"{placed.address} {placed.text}" for placed in assembly.placed]
-
-
-def _source(language: Language[Any], lines: Sequence[str]) -> str:
-    """Source with labels; the lines as they are if this assembler cannot read them."""
-    try:
-        return disassemble(language, assemble(language, "\n".join(lines)).whole)
-    except (AssemblyFailed, ValueError):
-        return "".join(f"{line}\n" for line in lines)
-
-
-def _there(unit: Programmed, assembly: Assembly[Any]) -> list[str]:
-    """What the unit holds in the places of a program, an instruction with its address a line."""
-    language = assembly.language
-    origin = _origin(language)
-    if origin is None:
-        return _addressed(language, unit.read_program())
-    found: list[str] = []
-    end = None
-    for placed in sorted(assembly.placed):
-        if placed.address != end:  # another program begins here
-            found += _addressed(language, [origin(placed.address), *unit.read_program(placed.address)])
-        end = placed.address + len(placed.code)
-    return found
-
-
-def _addressed(language: Language[Any], lines: Sequence[str]) -> list[str]:
-    try:
-        placed = assemble(language, "\n".join(lines)).placed
-    except AssemblyFailed:
-        return list(lines)
-    return [f"{each.address:4} {each.text}" for each in placed]

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
+
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
 
@@ -20,6 +22,7 @@ FIRST = Path("drilling", "bar-after-bar.toml")
 
 def workbench(
     target: Annotated[str | None, Parameter(show_default=False)] = None,
+    at: Annotated[str | None, Parameter(show_default=False)] = None,
     *,
     host: str = "127.0.0.1",
     port: int = 0,
@@ -37,15 +40,19 @@ def workbench(
     set_: Annotated[Sequence[str], Parameter(name="--set", negative=())] = (),
     state: Path | None = None,
     json: bool = False,
+    unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:
     """Show a controller or a cell in a browser, running in real time.
 
-    Without a target it is the drilling cell of the GS-C200 datasheet. The address to open is printed; Ctrl-C ends it.
+    Without a target it is the drilling cell of the GS-C200 datasheet. With a model and a port it is the unit there, and
+    the same model by the book beside it. The address to open is printed; Ctrl-C ends it.
 
     Parameters
     ----------
     target
         A model by name, or a cell file (CELL.toml).
+    at
+        Where a real unit of that model is: a serial device, HOST:PORT, or rfc2217://HOST:PORT.
     host
         Listen on this address. Any but loopback needs --token.
     port
@@ -78,6 +85,8 @@ def workbench(
         Keep EEPROM images and drafts in this folder instead of $XDG_STATE_HOME/detent or ~/.local/state/detent.
     json
         Print one line of JSON once everything is ready, and nothing else.
+    unit
+        Which real unit is meant, and its line.
     """
     from detent.cell.description import Problem
     from detent.cli.examples import home
@@ -99,6 +108,7 @@ def workbench(
             raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
         endpoints = asked_endpoints(links, tcp, rfc2217, serial)
         find(shown, straps=strap, options=set_)  # at once, not when everything is loaded
+        written = _unit_options(target, at, unit)
     except (Problem, MissingExtra) as error:
         asked_wrongly(error)
     from detent.workbench.client import Bench, BenchError
@@ -128,7 +138,10 @@ def workbench(
         bench = await opening
         try:
             drafts = Drafts(kept, cell_name(shown, is_file=_is_file(shown)))
-            site = server.application(bench, chosen, drafts, Place(host, listening.port, token))
+            place = Place(host, listening.port, token)
+            site, units = server.application(bench, chosen, drafts, place, kept)
+            if target is not None and at is not None:
+                await units.unit_connect(target, at, written)
 
             def ready() -> None:
                 if json:
@@ -138,7 +151,10 @@ def workbench(
                 if open_:
                     webbrowser.open(url)
 
-            await server.serve(site, listening, ready)
+            try:
+                await server.serve(site, listening, ready)
+            finally:
+                await units.close()
         finally:
             await bench.close()
 
@@ -146,10 +162,26 @@ def workbench(
         asyncio.run(show())
     except (Problem, ImagesUnusable) as error:
         asked_wrongly(error)
-    except (BenchError, OSError) as error:
+    except (BenchError, OSError) as error:  # a PortError is an OSError
         failed(error)
     finally:
         listening.socket.close()
+
+
+def _unit_options(target: str | None, at: str | None, unit: UnitOptions) -> str:
+    """The options of a real unit as the page Unit writes them. Raises Problem."""
+    from detent.cell.description import Problem
+
+    if at is None:
+        if unit != NO_UNIT_OPTIONS:
+            raise Problem("", "", "options of a real unit go with its port: detent workbench MODEL PORT")
+        return ""
+    try:
+        given = unit.given(target or "")
+    except ValueError as error:
+        raise Problem("", "", str(error)) from None
+    words = {name: ("yes" if value else "no") if isinstance(value, bool) else value for name, value in given.items()}
+    return " ".join(f"{name}={value}" for name, value in words.items())
 
 
 def _is_file(target: str) -> bool:

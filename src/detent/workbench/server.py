@@ -24,23 +24,27 @@ from detent.workbench.folder import Folder
 from detent.workbench.guard import Guard, names_of_this_machine
 from detent.workbench.listening import Listening, Place
 from detent.workbench.live import Live
-from detent.workbench.pages import Page, Window, cell, motion, program, scope, terminal
+from detent.workbench.pages import Page, Window, cell, motion, program, scope, terminal, unit
+from detent.workbench.stopping import Stopping
+from detent.workbench.units.registry import Units
 
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
 
-PAGES: tuple[Page, ...] = (cell.PAGE, program.PAGE, terminal.PAGE, scope.PAGE, motion.PAGE)
+PAGES: tuple[Page, ...] = (cell.PAGE, program.PAGE, terminal.PAGE, scope.PAGE, motion.PAGE, unit.PAGE)
 """The pages in the order of their tabs."""
 
 PATIENCE = 2  # s that open windows are given when the server ends
 
 
-def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place) -> Guard:
-    """The pages of `bench` behind their guard, an ASGI application. Once in a process: NiceGUI has but one.
+def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place, state: Path) -> tuple[Guard, Units]:
+    """The pages of `bench` behind their guard, an ASGI application; and who talks to real units, to be closed after it.
 
-    Raises ValueError for an address that needs a token.
+    Once in a process: NiceGUI has but one. What a restore replaces in a unit is kept below `state`. Raises ValueError
+    for an address that needs a token.
     """
     live = Live()
+    units = Units(live, Stopping(live), folder, state)
     site = FastAPI(title="Detent", docs_url=None, redoc_url=None, openapi_url=None)
     guard = Guard(site, place.host, place.token, names_of_this_machine())
     Board(bench, live)
@@ -66,7 +70,7 @@ def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place) ->
     icon = "data:image/svg+xml;utf8," + shell.FAVICON
     ui.run_with(site, root=root, title="Detent", favicon=icon, dark=None, tailwind=False, show_welcome_message=False,
                 reconnect_timeout=20, binding_refresh_interval=None, language="en-US")  # fmt: skip
-    return guard
+    return guard, units
 
 
 async def serve(application: Guard, listening: Listening, ready: Callable[[], None]) -> None:

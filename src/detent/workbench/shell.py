@@ -9,8 +9,8 @@ from detent.workbench.board import PACES
 from detent.workbench.icons import icon
 from detent.workbench.pages import Page, Window
 
-STYLES = ("workbench.css",)
-SCRIPTS = ("workbench.js", "timeline.js", "tour.js")
+STYLES = ("workbench.css", "unit.css")
+SCRIPTS = ("workbench.js", "timeline.js", "tour.js", "stop.js")
 
 FAVICON = (
     "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 24 24'><rect width='24' height='24' rx='5' fill='%2323282b'/>"
@@ -60,6 +60,8 @@ def _top(title: str, pages: Sequence[Page]) -> str:
   <h1 class="title" data-live="title">{escape(title)}</h1>
   <nav class="tabs" data-part="tabs" aria-label="Pages">{tabs}</nav>
   <span class="tools">
+    <button class="key stop" data-part="stop" hidden
+      data-help="Stop every unit that is connected (Esc twice); again: at once">STOP</button>
     <span class="others" data-level="windows" data-help="Windows that show this cell"><b data-live="windows"></b>
       windows</span>
     <button class="key bare" data-part="restart" aria-label="Begin anew"

@@ -1,11 +1,12 @@
 """What was said on a serial line, by whom, and what every byte of it was."""
 
+from collections.abc import Callable
 from itertools import groupby
 from typing import Final, NamedTuple
 
 from detent.cell.recording import Received
 from detent.controllers import catalogue
-from detent.controllers.phrase import Lines, Phrases
+from detent.controllers.phrase import Lines, Phrase, Phrases
 from detent.controllers.supersigma import link
 from detent.ticks import MS, Ns
 from detent.workbench.messages import LinePicture, Picture
@@ -137,16 +138,9 @@ class _Line:
         if not data:
             return Row(row.number, row.begin, row.end, row.sender, data, (), "", False, whole)
         phrase = self._phrases.read(data, row.sender == self._host)
-        parts, at = [], 0
-        for length, kind, meaning in phrase.pieces:
-            parts.append(Part(data[at : at + length], kind, self._text(data[at : at + length]), meaning))
-            at += length
-        if data[at:]:
-            parts.append(Part(data[at:], "unknown", self._text(data[at:]), ""))
+        parts = parted(phrase, data, self._text)
         note = f"damaged on the line; {phrase.note}" if row.damaged else phrase.note
-        return Row(
-            row.number, row.begin, row.end, row.sender, data, tuple(parts), note, phrase.wrong or row.damaged, whole
-        )
+        return Row(row.number, row.begin, row.end, row.sender, data, parts, note, phrase.wrong or row.damaged, whole)
 
 
 class Talks:
@@ -169,6 +163,17 @@ class Talks:
         found.update(mirror, mirror.until)
         first = max(since, found.first)
         return Talk(first, tuple(found.rows[first - found.first :]), found.next(), mirror.cuts)
+
+
+def parted(phrase: Phrase, data: bytes, text: Callable[[bytes], str]) -> tuple[Part, ...]:
+    """The bytes of a row as `phrase` divides them, each part written by `text`."""
+    parts, at = [], 0
+    for length, kind, meaning in phrase.pieces:
+        parts.append(Part(data[at : at + length], kind, text(data[at : at + length]), meaning))
+        at += length
+    if data[at:]:
+        parts.append(Part(data[at:], "unknown", text(data[at:]), ""))
+    return tuple(parts)
 
 
 def shown(data: bytes) -> str:

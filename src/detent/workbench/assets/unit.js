@@ -1,0 +1,497 @@
+// The page Unit: the unit that is chosen, filled into the markup of detent/workbench/pages/unit.py.
+
+const { part, on, get, call, toast, remembered, remember, seconds, grouped } = window.detent;
+
+const MOST = 800; // rows on the page
+const HELD = 300; // ms between two words that a key is held
+const ARMED = 3000; // ms in which a second click is a yes
+
+part("unit", (box) => {
+  const facts = JSON.parse(box.dataset.facts);
+  const role = (name) => box.querySelector(`[data-role="${name}"]`);
+  const all = (selector) => [...box.querySelectorAll(selector)];
+  const rows = role("rows");
+  const form = role("connect");
+  let chosen = null; // a name; null: the form
+  let next = 0;
+  let asking = false;
+  let again = false;
+  let armed = null;
+  let holding = 0;
+  let seen = "";
+
+  const names = () => get("r.names") || [];
+  const now = () => (chosen === null ? null : get(`r.${chosen}`));
+  const tried = async (deed) => {
+    try {
+      return await deed();
+    } catch (error) {
+      toast(error.message, "error");
+      return undefined;
+    }
+  };
+
+  function element(tag, name, text) {
+    const made = document.createElement(tag);
+    if (name) made.className = name;
+    if (text !== undefined) made.textContent = text;
+    return made;
+  }
+
+  /** The first click asks, the second within three seconds does it. */
+  function sure(button, why, deed) {
+    if (armed && armed.button === button) {
+      disarm();
+      deed();
+      return;
+    }
+    disarm();
+    armed = { button, text: button.textContent, timer: setTimeout(disarm, ARMED) };
+    button.textContent = "Sure?";
+    button.classList.add("armed");
+    toast(why);
+  }
+
+  function disarm() {
+    if (!armed) return;
+    clearTimeout(armed.timer);
+    armed.button.textContent = armed.text;
+    armed.button.classList.remove("armed");
+    armed = null;
+  }
+
+  // -- which unit --
+
+  function tabs() {
+    const there = names();
+    if (chosen !== null && !there.includes(chosen)) choose(there[0] ?? null);
+    else if (chosen === null && there.length && !box.dataset.asked) choose(there.includes(remembered("unit")) ? remembered("unit") : there[0]);
+    role("tabs").replaceChildren(...there.map((name) => tab(name, name)), tab(null, "Connect\u2026"));
+    besides();
+  }
+
+  function tab(name, text) {
+    const made = element("button", "", "");
+    made.type = "button";
+    made.setAttribute("role", "tab");
+    made.setAttribute("aria-selected", name === chosen ? "true" : "false");
+    made.append(element("b", "", text));
+    made.addEventListener("click", () => {
+      box.dataset.asked = "yes";
+      choose(name);
+    });
+    return made;
+  }
+
+  function choose(name) {
+    letGo();
+    disarm();
+    chosen = name;
+    if (name !== null) remember("unit", name);
+    form.hidden = name !== null;
+    role("bench").hidden = name === null;
+    rows.replaceChildren();
+    next = 0;
+    seen = "";
+    for (const one of ["answers", "sent", "told"]) role(one).replaceChildren();
+    role("restore").hidden = true;
+    for (const one of role("tabs").children) one.setAttribute("aria-selected", one.textContent === (name ?? "Connect\u2026") ? "true" : "false");
+    besides();
+    measure();
+    if (name === null) places();
+    else show();
+  }
+
+  async function places() {
+    const told = await tried(() => call("unit_places"));
+    if (!told || chosen !== null) return;
+    const row = (text, more, pick) => {
+      const made = element("button", "key small", "");
+      made.type = "button";
+      made.append(element("b", "mono", text), element("span", "quiet", more));
+      made.addEventListener("click", pick);
+      return made;
+    };
+    const field = (name) => form.elements[name];
+    const fill = (kind, made, none) => role(kind).replaceChildren(...(made.length ? made : [element("p", "quiet", none)]));
+    fill("ports", told.ports.map(([device, what]) => row(device, what, () => {
+      field("address").value = device;
+      field("address").focus();
+    })), "No serial port is plugged in. A port of another computer is HOST:PORT, or rfc2217://HOST:PORT.");
+    fill("cell", told.cell.map(([name, model, address, options]) => row(name, `${model} at ${address} ${options}`, () => connect(model, address, options, `${name} (cell)`))),
+      "No unit of this cell has an endpoint.");
+    box.querySelector("#ports").replaceChildren(...told.ports.map(([device, what]) => new Option(what, device)));
+  }
+
+  async function connect(model, address, options, name = "") {
+    const made = await tried(() => call("unit_connect", model, address, options, name));
+    if (made) choose(made);
+  }
+
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    connect(form.elements.model.value, form.elements.address.value.trim(), form.elements.options.value.trim());
+  });
+  const takes = () => {
+    const options = facts[form.elements.model.value].options;
+    role("takes").textContent = `It takes ${[...options, "baud", "data_bits", "parity", "stop_bits"].join(", ")}, each written NAME=VALUE.`;
+  };
+  form.elements.model.addEventListener("change", takes);
+  takes();
+
+  // -- the panel --
+
+  const lead = () => (role("measure").value && Number(role("lead").value) > 0 ? Number(role("lead").value) : 0);
+
+  function show() {
+    const told = now();
+    if (!told) return;
+    role("name").textContent = chosen;
+    const state = told.lost ? "port lost" : told.stopping ? "stopping" : told.state ?? "unknown";
+    role("state").textContent = told.job ? `${state} \u00b7 ${told.job}${told.progress[1] ? ` ${told.progress[0]}/${told.progress[1]}` : ""}` : state;
+    role("state").dataset.value = told.lost || told.trouble ? "bad" : told.moving ? "moving" : "";
+    const trouble = role("trouble");
+    const why = told.lost ? `The port is gone: ${told.lost}. Mend the cable, then connect again; nothing is sent until you do.`
+      : told.trouble || (told.outcome.startsWith("STOP was not") ? told.outcome : "");
+    trouble.hidden = !why;
+    trouble.firstElementChild.textContent = why;
+    role("again").textContent = told.lost ? "Connect again" : "Ask again";
+    const unknown = told.position === null;
+    role("position").textContent = unknown ? "unknown" : `${told.position > 0 ? "+" : ""}${grouped(told.position)}`;
+    role("position").classList.toggle("unknown", unknown);
+    role("steps").textContent = unknown ? (told.last === null ? "" : `last told: ${grouped(told.last)}`) : told.can.unit;
+    role("place").textContent = !unknown && lead() ? `${(told.position / lead()).toFixed(3)} ${role("measure").value}` : "";
+    role("rate").textContent = told.rate === null ? "" : grouped(Math.round(told.rate));
+    role("rate-unit").textContent = told.rate === null ? "" : `${told.can.unit}/s`;
+    role("speed-unit").textContent = `${told.can.unit}/s`;
+    const print = JSON.stringify(told.facts);
+    if (print !== seen) {
+      seen = print;
+      role("lamps").replaceChildren(...told.facts.filter((one) => one[3]).map(lamp));
+      role("facts").replaceChildren(...told.facts.filter((one) => !one[3]).flatMap(([name, value, source]) => {
+        const words = element("dd", value === null ? "unknown" : "mono", value === null ? "unknown" : value);
+        words.dataset.help = source;
+        return [element("dt", "", name), words];
+      }));
+    }
+    const paused = role("pause");
+    paused.setAttribute("aria-pressed", told.paused ? "true" : "false");
+    if (document.activeElement !== role("rates")) role("rates").value = String(told.asking);
+    role("took").textContent = told.lost ? "not asked: the port is gone" : told.paused ? "not asked: what is shown is what it told last"
+      : told.trouble ? "asked less often while it does not answer" : `asked ${told.asking}\u00d7 a second; ${Math.round(told.took * 1000)} ms each`;
+    hands(told);
+    const program = facts[told.model] && !["bs0610", "bs0710", "supersigma"].includes(told.model);
+    role("program").hidden = !program;
+    box.querySelector(".keeps").hidden = told.model === "supersigma";
+    soon();
+  }
+
+  function lamp([name, value, source]) {
+    const made = element("span", value === null ? "lamp unknown" : "lamp");
+    made.dataset.value = value === null ? "" : value;
+    made.dataset.help = `${name}: ${value === null ? "unknown" : value} (${source})`;
+    made.append(element("i", "led"), element("span", "", name), element("b", "num", value === null ? "?" : value));
+    return made;
+  }
+
+  role("again").addEventListener("click", () => tried(() => call("unit_again", chosen)));
+  role("leave").addEventListener("click", () => tried(() => call("unit_leave", chosen)));
+  const ask = (paused) => tried(() => call("unit_asking", chosen, paused, Number(role("rates").value)));
+  role("pause").addEventListener("click", () => ask(!now().paused));
+  role("rates").addEventListener("change", () => ask(now().paused));
+
+  // -- hands --
+
+  function hands(told) {
+    const busy = Boolean(told.job || told.lost || told.stopping);
+    for (const one of all(".hand [data-jog], .hand [data-role=go], .hand [data-role=zero]")) one.disabled = busy;
+    role("home").disabled = busy || told.can.home !== "";
+    for (const one of all("[data-hold]")) one.disabled = told.can.hold !== "" || (busy && !told.held);
+    role("why").textContent = [told.can.hold, told.can.home, told.can.before_hold && `Hold: ${told.can.before_hold}`, told.can.before_home && `Home: ${told.can.before_home}`].filter(Boolean).join(" ");
+  }
+
+  function measure() {
+    const kept = JSON.parse(remembered(`lead.${chosen}`) || "null");
+    role("measure").value = kept ? kept[0] : "";
+    role("lead").value = kept ? kept[1] : 1;
+    measured();
+  }
+
+  function measured() {
+    role("lead-label").hidden = !role("measure").value;
+    role("lead-unit").textContent = role("measure").value;
+    for (const one of ["by", "target"]) role(one).dataset.unit = role("measure").value || "steps";
+  }
+
+  for (const one of ["measure", "lead"]) role(one).addEventListener("change", () => {
+    measured();
+    remember(`lead.${chosen}`, JSON.stringify([role("measure").value, role("lead").value]));
+    show();
+  });
+
+  /** What a field says, in whole steps; null with a word where it is no number. */
+  function steps(name) {
+    const value = Number(role(name).value);
+    if (role(name).value === "" || !Number.isFinite(value)) {
+      toast("Write a number first.", "error");
+      return null;
+    }
+    return Math.round(value * (lead() || 1));
+  }
+
+  async function hand(what, value) {
+    const sent = await tried(() => call("unit_hand", chosen, what, value));
+    if (sent) role("sent").textContent = sent.length ? `sent ${sent.join(", ")}` : "nothing had to be sent";
+  }
+
+  for (const button of all("[data-jog]")) button.addEventListener("click", () => {
+    const by = steps("by");
+    if (by !== null) hand("jog", by * Number(button.dataset.jog));
+  });
+  role("go").addEventListener("click", () => {
+    const to = steps("target");
+    if (to !== null) hand("go", to);
+  });
+  role("zero").addEventListener("click", (event) => sure(event.currentTarget, "Click once more: where the axis stands is 0 then.", () => hand("zero", 0)));
+  role("home").addEventListener("click", (event) => sure(event.currentTarget, `Click once more: the axis goes until it meets a switch. ${now().can.before_home}`,
+    () => hand("home", Number(role("direction").value))));
+  role("stop").addEventListener("click", () => stopped(call("unit_stop", chosen)));
+
+  async function stopped(stopping) {
+    letGo(false);
+    const told = await tried(() => stopping);
+    if (told) role("sent").textContent = told;
+  }
+
+  function letGo(stop = true) {
+    if (!holding) return;
+    clearInterval(holding);
+    holding = 0;
+    for (const one of all("[data-hold]")) one.classList.remove("down");
+    if (stop) stopped(call("unit_stop", chosen));
+  }
+
+  async function hold(button) {
+    const speed = Number(role("speed").value);
+    if (holding || button.disabled) return;
+    if (!(speed > 0)) {
+      toast("Write a rate first.", "error");
+      return;
+    }
+    button.classList.add("down");
+    const name = chosen;
+    holding = setInterval(() => call("unit_held", name).catch(() => {}), HELD);
+    try {
+      const sent = await call("unit_hold", name, speed * Number(button.dataset.hold));
+      if (holding) role("sent").textContent = `sent ${sent.join(", ")}`;
+    } catch (error) {
+      const was = holding;
+      letGo(false);
+      if (was) toast(error.message, "error");
+    }
+  }
+
+  for (const button of all("[data-hold]")) {
+    button.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      try {
+        button.setPointerCapture(event.pointerId);
+      } catch {
+        /* a pointer that is gone already */
+      }
+      hold(button);
+    });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(end, () => letGo());
+    button.addEventListener("contextmenu", (event) => event.preventDefault());
+    button.addEventListener("keydown", (event) => {
+      if (event.key !== " " && event.key !== "Enter") return;
+      event.preventDefault();
+      if (!event.repeat) hold(button);
+    });
+    button.addEventListener("keyup", (event) => {
+      if (event.key === " " || event.key === "Enter") letGo();
+    });
+  }
+  const away = () => letGo();
+  const hidden = () => document.hidden && letGo();
+  const noMore = () => letGo(false);
+  addEventListener("blur", away);
+  addEventListener("pagehide", away);
+  document.addEventListener("visibilitychange", hidden);
+  document.addEventListener("detent-stop", noMore);
+
+  // -- the line --
+
+  function row(one) {
+    const made = element("div", `said${one.sender ? "" : " host"}${one.wrong ? " wrong" : ""}${one.question ? " question" : ""}`);
+    made.dataset.number = one.number;
+    made.append(element("span", "when", seconds(one.begin)), element("span", "who", one.sender ? "\u2190 unit" : "\u2192 host"));
+    const what = element("span", "what");
+    for (const [kind, shown, meaning, hex] of one.parts) {
+      const chip = element("span", `chip ${kind}`, shown);
+      chip.dataset.help = `${meaning || kind} \u00b7 ${hex}`;
+      chip.append(element("i", "", hex));
+      what.append(chip);
+    }
+    if (one.note) what.append(element("span", "note", one.note));
+    made.append(what);
+    return made;
+  }
+
+  async function soon() {
+    if (asking) {
+      again = true;
+      return;
+    }
+    asking = true;
+    const mine = chosen;
+    try {
+      do {
+        again = false;
+        const told = await call("unit_talk", mine, next);
+        if (mine !== chosen) break;
+        const stay = rows.scrollHeight - rows.scrollTop - rows.clientHeight > 40;
+        while (rows.lastChild && Number(rows.lastChild.dataset.number) >= told.first) rows.lastChild.remove();
+        rows.append(...told.rows.map(row));
+        while (rows.children.length > MOST) rows.firstChild.remove();
+        next = told.next;
+        if (!stay) rows.scrollTop = rows.scrollHeight;
+      } while (again);
+    } catch {
+      /* the connection is told elsewhere */
+    } finally {
+      asking = false;
+    }
+  }
+
+  function besides() {
+    const select = role("beside");
+    const before = select.value;
+    const others = names().filter((name) => name !== chosen);
+    select.replaceChildren(new Option("to it alone", ""), ...others.map((name) => new Option(`and to ${name}`, name)));
+    select.value = others.includes(before) ? before : "";
+    select.hidden = !others.length;
+  }
+
+  function hint() {
+    const told = now();
+    const written = role("text").value.trim();
+    const found = told && (facts[told.model].words || []).find(([spelling]) => written && written.startsWith(spelling));
+    role("hint").textContent = found ? found.slice(1).join("   or   ") : written ? "" : "What the protocol adds is added: checksum, end, name, the echo of each character.";
+  }
+
+  role("text").addEventListener("input", hint);
+  role("say").addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const line = role("text").value.trim();
+    if (!line) return;
+    role("text").value = "";
+    hint();
+    const other = role("beside").value;
+    const told = await tried(() => (other ? call("unit_both", [chosen, other], line) : call("unit_say", chosen, line)));
+    if (!told) {
+      if (!role("text").value) role("text").value = line; // to be mended
+      return;
+    }
+    answers(line, Array.isArray(told) ? told : [told]);
+  });
+
+  function answers(line, told) {
+    const table = element("table", "");
+    for (const one of told) {
+      const made = element("tr", one.refused ? "wrong" : "");
+      made.append(element("td", "quiet", one.unit), element("td", "mono", one.answers.join("  ") || "\u2013"), element("td", "", one.meaning),
+        element("td", "num", one.ms === null ? "" : `${one.ms} ms`));
+      table.append(made);
+    }
+    const parts = [element("div", "asked", ""), table];
+    parts[0].append(element("b", "mono", line));
+    if (told.length > 1) {
+      const same = JSON.stringify(told[0].answers) === JSON.stringify(told[1].answers) && told[0].refused === told[1].refused;
+      const by = told[0].ms !== null && told[1].ms !== null ? `, ${(told[0].ms - told[1].ms).toFixed(1)} ms between them` : "";
+      parts[0].append(element("span", same ? "same" : "differ", same ? ` the same answers${by}` : ` they differ${by}`));
+    }
+    role("answers").replaceChildren(...parts);
+  }
+
+  role("hex").addEventListener("click", () => toggle("hex", "with-hex"));
+  role("polls").addEventListener("click", () => toggle("polls", "with-polls"));
+  function toggle(name, style) {
+    const on = rows.classList.toggle(style);
+    role(name).setAttribute("aria-pressed", on ? "true" : "false");
+  }
+
+  // -- program and backup --
+
+  const tell = (text) => (role("told").textContent = text);
+  const source = () => role("source").value;
+
+  role("read").addEventListener("click", async () => {
+    const read = async () => {
+      const text = await tried(() => call("unit_source", chosen));
+      if (text === undefined) return;
+      role("source").value = text;
+      tell(text.trim() ? "read from the unit" : "the unit holds no program");
+    };
+    if (source().trim()) sure(role("read"), "Click once more: what is written here is replaced.", read);
+    else read();
+  });
+  role("compare").addEventListener("click", async () => {
+    const lines = await tried(() => call("unit_compare", chosen, source()));
+    if (lines) tell(lines.length ? lines.join("\n") : "the unit holds this program");
+  });
+  role("store").addEventListener("click", (event) => sure(event.currentTarget, "Click once more: the program in the unit is replaced by this one. It is not started.", async () => {
+    const told = await tried(() => call("unit_store", chosen, source(), role("save").checked));
+    if (told) tell(told);
+  }));
+
+  const file = () => role("file").value.trim() || `${now().model}-backup.toml`;
+  role("file").addEventListener("focus", async () => {
+    const files = await call("files", [".toml"]).catch(() => []);
+    box.querySelector("#backups").replaceChildren(...files.map((name) => new Option(name)));
+  });
+  role("file").addEventListener("input", () => (role("restore").hidden = true));
+  role("backup").addEventListener("click", async () => {
+    const name = file();
+    role("file").value = name;
+    try {
+      tell(`Wrote ${await call("unit_backup", chosen, name, false)}`);
+    } catch (error) {
+      if (!/there already/.test(error.message)) toast(error.message, "error");
+      else sure(role("backup"), `${name} is there already. Click once more to replace it.`, async () => {
+        const told = await tried(() => call("unit_backup", chosen, name, true));
+        if (told) tell(`Wrote ${told}`);
+      });
+    }
+  });
+  let differed = "";
+  role("differs").addEventListener("click", async () => {
+    const told = await tried(() => call("unit_differs", chosen, file()));
+    if (!told) return;
+    differed = told.seen;
+    role("restore").hidden = !told.lines.length;
+    tell(told.lines.length ? told.lines.join("\n") : "Nothing differs: the unit holds what the file says.");
+  });
+  role("restore").addEventListener("click", async () => {
+    role("restore").hidden = true;
+    const told = await tried(() => call("unit_restore", chosen, file(), differed));
+    if (told) tell(told.join("\n"));
+  });
+
+  const ends = [
+    on("r.", (key) => {
+      if (key === "r.names") tabs();
+      else if (key === `r.${chosen}`) show();
+    }),
+  ];
+  tabs();
+  if (chosen === null) choose(null);
+  return () => {
+    letGo();
+    ends.forEach((end) => end());
+    removeEventListener("blur", away);
+    removeEventListener("pagehide", away);
+    document.removeEventListener("visibilitychange", hidden);
+    document.removeEventListener("detent-stop", noMore);
+  };
+});

@@ -1,0 +1,353 @@
+"""A unit that the workbench talks to: what it told last, one job at a time, and a stop that is before everything."""
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Mapping
+from typing import Any, Final, TypeVar
+
+from detent.controllers import catalogue
+from detent.controllers.gsc200.pins import select
+from detent.controllers.phrase import Phrases
+from detent.hosts.axis import Axis
+from detent.hosts.errors import DriverError
+from detent.hosts.exchange import Asynchronous, Progress, Steps
+from detent.hosts.typed import Said, say
+from detent.pins import HIGH, LOW, Level
+from detent.realtime.connect import connect_async, host
+from detent.workbench.live import Value
+from detent.workbench.stopping import StopFailed
+from detent.workbench.units.asked import Look, look
+from detent.workbench.units.hands import Can, can
+from detent.workbench.units.hands import run as run_at
+from detent.workbench.units.tap import Tap
+from detent.workbench.units.transcript import Transcript
+
+T = TypeVar("T")
+
+WATCH: Final = 0.1  # seconds between two looks whether the port is there
+RATES: Final = (0.2, 0.5, 1.0, 2.0, 5.0)  # looks a second that one may choose
+RATE: Final = 1.0
+SLOWEST: Final = 8.0  # seconds between two looks at a unit that does not answer
+RAMP_SECONDS: Final = 2.0  # that a unit has to take its stop command, before it is stopped at once
+HALT_SECONDS: Final = 5.0  # and for that one
+HOLD_SECONDS: Final = 1.0  # a key is let go if its window has not said for so long that it is held
+FORM: Final = ("baud", "data_bits", "stop_bits")
+WHOLE: Final = (*FORM, "address", "drive")  # options that are whole numbers
+NOT_ALIVE: Final = "the port is gone ({}): mend the cable, then connect again; nothing was sent since"
+
+
+class UnitBusy(RuntimeError):
+    """Something else is done with the unit. The text says what, and what to do."""
+
+
+def options_of(text: str) -> dict[str, Any]:
+    """Options as people write them: ``name=X mode=party baud=4800 checksums=no``. Raises ValueError."""
+    found: dict[str, Any] = {}
+    for word in text.split():
+        name, equals, value = word.partition("=")
+        name = name.strip("-").replace("-", "_")
+        if not equals or not value:
+            raise ValueError(f"{word!r}: write options like name=X mode=party baud=4800 checksums=no")
+        try:
+            found[name] = int(value) if name in WHOLE else float(value) if name == "patience" else value
+        except ValueError:
+            raise ValueError(f"{word!r}: {name} takes a number") from None
+        if name == "checksums":
+            found[name] = value.lower() in ("yes", "true", "1", "high")
+    if "name" in found and "mode" not in found:
+        found["mode"] = "party"  # in single mode an axis needs no name
+    return found
+
+
+class Unit:
+    """A unit at a port. Make it with `open`; nothing is sent before `begin`.
+
+    One job at a time; looks come between. `stop` breaks off whatever is done. A port that is lost is told at once, and
+    nothing is sent until `connect`.
+    """
+
+    @classmethod
+    async def open(
+        cls,
+        name: str,
+        model: str,
+        address: str,
+        options: Mapping[str, Any],
+        told: Callable[["Unit"], None],
+        beside: "Unit | None" = None,
+    ) -> "Unit":
+        """The unit of `model` at `address`, as `connect` takes both. `told` is called when `facts` have changed.
+
+        `beside`: a unit on the same line, whose port they share. Raises ValueError, PortError.
+        """  # fmt: skip
+        unit = cls(name, model, address, told)
+        port = address if beside is None else beside.tap.port
+        shell = await connect_async(model, port, watch=unit._watch, **options)
+        transcript = Transcript(phrases(model, options), numbers=model == "supersigma")
+        unit.tap = Tap(shell.port, transcript, None if beside is None else beside.tap)
+        shell.port = unit.tap
+        unit.shell = shell
+        unit.written = " ".join(f"{key}={value}" for key, value in options.items())
+        unit.able = can(shell.driver)
+        return unit
+
+    shell: Asynchronous
+    tap: Tap
+    able: Can
+
+    def __init__(self, name: str, model: str, address: str, told: Callable[["Unit"], None]) -> None:
+        """Use `open`."""
+        self.name, self.model, self.address, self._told = name, model, address, told
+        self.written = ""  # its options
+        self.paused = False
+        self.rate = RATE
+        self.seen: Look | None = None  # what it told last, None: nothing that is known
+        self.last: int | None = None  # the position that it told last
+        self.trouble = ""  # why it does not tell
+        self.job = ""  # what is done with it
+        self.progress: tuple[int, int, str] = (0, 0, "")
+        self.outcome = ""  # what came of the last stop
+        self.took = 0.0  # seconds of the last look
+        self._looking: asyncio.Task[Look] | None = None
+        self._doing: asyncio.Task[Any] | None = None
+        self._stopping: asyncio.Task[str] | None = None
+        self._loop: asyncio.Task[None] | None = None
+        self._failures = 0
+        self._held_until = 0.0  # by the clock of the event loop; 0: no key is held
+        self._closed = False
+
+    # -- being there -------------------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Look at it from now on."""
+        self._loop = asyncio.create_task(self._look_on())
+
+    async def connect(self) -> None:
+        """After the port was lost, or the unit has not answered: look again. Raises OSError."""
+        if self.tap.lost:
+            self.shell.driver.forget()
+            self.tap.renew()
+            await self.tap.look()
+        self._failures, self.trouble, self.paused = 0, "", False
+        self._tell()
+
+    async def close(self, *, port: bool = True) -> None:
+        """Let go of it, and of its port unless others share it. A key that is held is let go; else nothing is sent."""
+        if self._held_until:
+            with contextlib.suppress(StopFailed):
+                await self.stop()
+        self._closed = True
+        await self.break_off()
+        if self._loop is not None:
+            self._loop.cancel()
+        if port:
+            await self.tap.close()
+
+    @property
+    def facts(self) -> dict[str, Value]:
+        """Everything that windows show of it."""
+        seen = self.seen
+        able = self.able
+        return {
+            "model": self.model, "address": self.address, "options": self.written, "lost": self.tap.lost,
+            "trouble": self.trouble, "state": seen.state if seen else None, "moving": seen.moving if seen else None,
+            "position": seen.position if seen else None, "last": self.last, "rate": seen.rate if seen else None,
+            "facts": [list(fact) for fact in seen.facts] if seen else [], "paused": self.paused, "asking": self.rate,
+            "took": round(self.took, 4), "job": self.job, "progress": list(self.progress), "outcome": self.outcome,
+            "stopping": self._stopping is not None, "held": self._held_until > 0, "can": able._asdict(),
+            "talk": self.tap.transcript.count,
+        }  # fmt: skip
+
+    # -- jobs --------------------------------------------------------------------------------------------
+
+    async def perform(self, what: str, steps: Steps[T]) -> T:
+        """Carry out an operation of the plain driver. It goes on if who asked for it goes away; `stop` breaks it off.
+
+        Raises UnitBusy, DriverError, ValueError.
+        """
+        if self.tap.lost:
+            raise UnitBusy(NOT_ALIVE.format(self.tap.lost))
+        if self._stopping is not None or self._doing is not None:
+            raise UnitBusy(f"{self.name}: {self.job or 'a stop'} is under way; wait for its end, or STOP it")
+        self.job, self.progress, self.outcome = what, (0, 0, ""), ""
+        self._doing = asyncio.create_task(self._do(steps))
+        self._doing.add_done_callback(self._done)
+        self._tell()
+        try:
+            result: T = await asyncio.shield(self._doing)
+            return result
+        except asyncio.CancelledError:
+            if self._doing is not None and not self._doing.cancelled():
+                raise  # who asked went away
+            raise UnitBusy(f"{self.name}: {what} was broken off by a stop") from None
+
+    async def _do(self, steps: Steps[T]) -> T:
+        looking = self._looking
+        if looking is not None:
+            await asyncio.wait([looking])
+        return await self.shell.perform(steps)
+
+    def _done(self, task: "asyncio.Task[Any]") -> None:
+        if self._doing is task:
+            self._doing, self.job, self.progress = None, "", (0, 0, "")
+        if not task.cancelled():
+            task.exception()  # told to whoever asked, if he is still there
+        self._tell()
+
+    async def say(self, line: str) -> tuple[Said, float]:
+        """A line as it is typed; what was said to it, and how many seconds passed from its first byte to the last."""
+        self.tap.sent = self.tap.came = 0.0
+        begin = self.tap.clock()
+        said = await self.perform(f"the line {line}", say(self.shell.driver, line))
+        return said, max(self.tap.came - begin, 0.0)
+
+    # -- stop --------------------------------------------------------------------------------------------
+
+    async def stop(self) -> str:
+        """Break off whatever is done, and stop the axis: by its ramp; at once if that fails, or at a second call.
+
+        In words what was done. Raises StopFailed where the unit has confirmed neither.
+        """
+        again = self._stopping is not None
+        self._held_until = 0.0
+        await self.break_off()
+        task = self._stopping = asyncio.create_task(self._stop(at_once=again))
+        self._tell()
+        try:
+            self.outcome = await asyncio.shield(task)
+            return self.outcome
+        except asyncio.CancelledError:
+            if not task.cancelled():
+                raise  # who asked went away; the stop goes on
+            return "stopped at once instead"
+        except StopFailed as error:
+            self.outcome = str(error)
+            raise
+        finally:
+            if self._stopping is task and task.done():
+                self._stopping = None
+            elif self._stopping is task:
+                task.add_done_callback(self._stopped)
+            self._tell()
+
+    async def _stop(self, *, at_once: bool) -> str:
+        driver = self.shell.driver
+        assert isinstance(driver, Axis)
+        why = ""
+        ways = ((driver.stop, RAMP_SECONDS, "stops by its ramp"), (driver.halt, HALT_SECONDS, "stopped at once"))
+        for way, seconds, words in ways[at_once:]:
+            try:
+                await asyncio.wait_for(self.shell.perform(way()), seconds)
+                return words + (f", because {why}" if why else "")
+            except (DriverError, ValueError, OSError) as error:  # a TimeoutError is an OSError
+                why = why or str(error) or f"it did not take its stop command within {seconds:g} s"
+        raise StopFailed(f"STOP was not confirmed: {why}. If it moves, switch off the supply of its motor")
+
+    def _stopped(self, task: "asyncio.Task[str]") -> None:
+        if self._stopping is task:
+            self._stopping = None
+        if not task.cancelled():
+            error = task.exception()
+            self.outcome = str(error) if error is not None else task.result()
+        self._tell()
+
+    async def break_off(self) -> None:
+        """End whatever is done with it, looks too; the port is free then."""
+        tasks = [task for task in (self._looking, self._doing, self._stopping) if task is not None]
+        for task in tasks:
+            task.cancel()
+        if tasks:
+            await asyncio.wait(tasks)
+
+    # -- a key that is held ------------------------------------------------------------------------------
+
+    async def hold(self, rate: float) -> None:
+        """Run at `rate` as long as `still_held` is called. Raises as `perform`."""
+        if self.able.hold:
+            raise ValueError(self.able.hold)
+        driver = self.shell.driver
+        assert isinstance(driver, Axis)
+        self._held_until = asyncio.get_running_loop().time() + HOLD_SECONDS
+        try:
+            await self.perform("jog", run_at(driver, rate))
+        except BaseException:
+            self._held_until = 0.0
+            raise
+
+    def still_held(self) -> None:
+        """The key is still held."""
+        if self._held_until:
+            self._held_until = asyncio.get_running_loop().time() + HOLD_SECONDS
+
+    # -- looking -----------------------------------------------------------------------------------------
+
+    async def _look_on(self) -> None:
+        loop = asyncio.get_running_loop()
+        due = loop.time()
+        while not self._closed:
+            if self._held_until and loop.time() > self._held_until:
+                with contextlib.suppress(StopFailed):  # it is told in `outcome`
+                    await self.stop()
+            if self._doing is None and self._stopping is None and not self.tap.lost:
+                if not self.paused and loop.time() >= due:
+                    await self._look()
+                    due = loop.time() + min(2.0 ** min(self._failures, 10) / self.rate, max(SLOWEST, 1 / self.rate))
+                else:
+                    await self._see_port()
+            await asyncio.sleep(WATCH)
+
+    async def _see_port(self) -> None:
+        before = self.tap.transcript.count
+        with contextlib.suppress(OSError):
+            await self.tap.look()
+        if self.tap.lost:
+            self._unknown(f"the port is gone: {self.tap.lost}")
+        elif self.tap.transcript.count != before:
+            self._tell()  # it talks without being asked
+
+    async def _look(self) -> None:
+        begin = self.tap.clock()
+        self.tap.transcript.looking = True
+        self._looking = asyncio.create_task(self.shell.perform(look(self.shell.driver)))
+        await asyncio.wait([self._looking])
+        self.tap.transcript.looking = False
+        task, self._looking = self._looking, None
+        if task.cancelled():
+            return
+        error = task.exception()
+        if error is None:
+            self.seen, self.trouble, self._failures = task.result(), "", 0
+            self.last = self.seen.position if self.seen.position is not None else self.last
+            self.took = max(self.tap.clock() - begin, 0.0)
+            self._tell()
+        elif isinstance(error, DriverError | ValueError | OSError):
+            self._failures += 1
+            self._unknown(str(error))
+            if self.model == "dcb-274":  # the next question would begin by connecting anew, which a person must want
+                self.paused = True
+                self._tell()
+        else:
+            raise error
+
+    def _unknown(self, why: str) -> None:
+        """Nothing is known of it any more."""
+        self.seen, self.trouble = None, why
+        self._tell()
+
+    def _watch(self, step: Progress) -> None:
+        self.progress = (step.done, step.total, step.what)
+        self._tell()
+
+    def _tell(self) -> None:
+        self._told(self)
+
+
+def phrases(model: str, options: Mapping[str, Any]) -> Phrases:
+    """What is said on the line of such a unit, in words. Raises ValueError for a model that nobody drives."""
+    host(model)
+    straps: dict[str, Level] = {}
+    if "checksums" in options:
+        straps["CHS"] = HIGH if options["checksums"] else LOW
+    if options.get("address") is not None:
+        straps |= select(int(options["address"]))
+    return catalogue.model(model).phrases(straps)

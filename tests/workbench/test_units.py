@@ -1,0 +1,317 @@
+"""Units that the workbench talks to: looks, lines, hands, STOP; units that stall, babble, lie, or are unplugged."""
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from detent.cell.build import build
+from detent.cell.cell import Cell
+from detent.cell.description import parse
+from detent.cell.host import HostPort
+from detent.hosts.dcb274 import BlockingDcb274, Dcb274
+from detent.hosts.errors import DriverError
+from detent.hosts.genstepper import BlockingGenStepper, GenStepper
+from detent.hosts.gsc200 import BlockingGsC200, GsC200
+from detent.hosts.supersigma import BlockingSupersigma, Supersigma
+from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.service import Service
+from detent.workbench.folder import Folder
+from detent.workbench.live import Live
+from detent.workbench.stopping import StopFailed, Stopping
+from detent.workbench.units.asked import look
+from detent.workbench.units.registry import Units
+from detent.workbench.units.unit import UnitBusy, options_of
+
+PATIENCE = 120  # seconds: nothing here takes that long
+DRIVERS: dict[str, Callable[[HostPort], Any]] = {
+    "gs-c200": lambda port: BlockingGsC200(GsC200(), port),
+    "gs-c200s": lambda port: BlockingGsC200(GsC200("gs-c200s"), port),
+    "dcb-274": lambda port: BlockingDcb274(Dcb274(), port),
+    "bs0610": lambda port: BlockingGenStepper(GenStepper("X"), port),
+    "bs0710": lambda port: BlockingGenStepper(GenStepper("Y"), port),
+    "supersigma": lambda port: BlockingSupersigma(Supersigma(1), port),
+}
+QUESTIONS = ("X\r", "^\r", "Z\r", "]0\r", " ", "\b")  # of a DCB-274, its sign-on, and BS, which empties the line
+
+
+class Told(HostPort):
+    """A port that remembers what was sent."""
+
+    def __init__(self, cell: Cell) -> None:
+        super().__init__(cell)
+        self.sent = b""
+
+    def write(self, data: bytes) -> int:
+        self.sent += data
+        return super().write(data)
+
+
+def emulated(model: str) -> tuple[Cell, Told, Any]:
+    cell = build(parse(f'[units.unit]\nmodel = "{model}"\n', "cell"), lambda file: "")
+    port = Told(cell)
+    return cell, port, DRIVERS[model](port)
+
+
+@pytest.mark.parametrize("model", DRIVERS)
+def test_a_look_tells_where_an_axis_is_and_moves_nothing(model: str) -> None:
+    cell, _, unit = emulated(model)
+    for _ in range(3):
+        seen = unit.perform(look(unit.driver))
+    assert (seen.position, seen.moving) == (0, False)
+    assert all(not one.status(cell.now, axis).position for one in cell.controllers().values() for axis in one.axes)
+    unit.move_to(4000)
+    seen = unit.perform(look(unit.driver))
+    assert seen.moving
+    if model.startswith("gs-c200"):  # while it is busy it answers F, Z and K alone
+        assert seen.position is None
+        assert all(fact.value is None for fact in seen.facts)
+    unit.wait()
+    assert unit.perform(look(unit.driver)).position == 4000
+
+
+def test_a_look_at_a_dcb_274_says_nothing_but_questions() -> None:
+    _, port, unit = emulated("dcb-274")
+    for _ in range(3):
+        unit.perform(look(unit.driver))
+    said = port.sent.decode("latin-1")
+    for question in QUESTIONS:
+        said = said.replace(question, "")
+    assert said == ""
+
+
+def test_a_look_at_a_dcb_274_that_runs_a_program_leaves_it_alone() -> None:
+    _, _, unit = emulated("dcb-274")
+    unit.write_program(["+ 2000", "W 0", "- 2000", "W 0"])
+    unit.go()
+    seen = unit.perform(look(unit.driver))
+    assert (seen.position, seen.moving) == (None, None)
+    unit.wait()
+    assert unit.position() == 0
+
+
+@pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "bs0610"])
+def test_a_look_at_a_unit_without_supply_is_an_error_and_no_figure(model: str) -> None:
+    cell, _, unit = emulated(model)
+    cell.power("unit", False)
+    with pytest.raises(DriverError):
+        unit.perform(look(unit.driver))
+
+
+def test_options_are_written_as_people_write_them() -> None:
+    assert options_of("name=X baud=4800 checksums=no") == {
+        "name": "X", "baud": 4800, "checksums": False, "mode": "party"
+    }  # fmt: skip
+    for wrong in ("name", "baud=fast", "name="):
+        with pytest.raises(ValueError, match=wrong):
+            options_of(wrong)
+
+
+# -- in real time, against what is served -------------------------------------------------------------------------
+
+
+class Desk:
+    """Units as windows have them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.live = Live()
+        self.stopping = Stopping(self.live)
+        self.units = Units(self.live, self.stopping, Folder(folder), folder / "state")
+
+    def facts(self, name: str) -> Any:
+        return self.live.get(f"r.{name}")
+
+    async def until(self, name: str, condition: Callable[[Any], bool]) -> Any:
+        while not ((facts := self.facts(name)) and condition(facts)):
+            await asyncio.sleep(0.01)
+        return facts
+
+
+def at_desk(folder: Path, scene: Callable[[Desk], Awaitable[None]]) -> None:
+    async def whole() -> None:
+        desk = Desk(folder)
+        try:
+            await asyncio.wait_for(scene(desk), PATIENCE)
+        finally:
+            await desk.units.close()
+
+    asyncio.run(whole())
+
+
+@contextmanager
+def served(model: str, pace: int = 20) -> Iterator[str]:
+    text = f'[units.unit]\nmodel = "{model}"\n'
+    with Service(parse(text, "cell"), lambda file: "", [Wanted("pty")], pace=pace) as service:
+        serving = threading.Thread(target=service.run)
+        serving.start()
+        try:
+            yield service.endpoints[0].address
+        finally:
+            service.stop()
+            serving.join()
+
+
+@asynccontextmanager
+async def strange(
+    answer: Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]],
+) -> AsyncIterator[str]:
+    """A port at which something else than a unit lives."""
+    server = await asyncio.start_server(answer, "127.0.0.1", 0)
+    async with server:
+        yield f"127.0.0.1:{server.sockets[0].getsockname()[1]}"
+
+
+@pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "bs0610"])
+def test_hands_in_the_commands_of_the_controller(tmp_path: Path, model: str) -> None:
+    async def scene(desk: Desk) -> None:
+        name = await desk.units.unit_connect(
+            model, address, "motor=X patience=2" if model == "bs0610" else "patience=2"
+        )
+        await desk.until(name, lambda facts: facts["position"] == 0)
+        sent = await desk.units.unit_hand(name, "jog", 250)
+        assert any("250" in line for line in sent), sent
+        await desk.until(name, lambda facts: facts["position"] == 250 and not facts["moving"])
+        await desk.units.unit_hand(name, "zero")
+        await desk.until(name, lambda facts: facts["position"] == 0)
+        await desk.units.unit_hand(name, "go", 70)
+        await desk.until(name, lambda facts: facts["position"] == 70 and not facts["moving"])
+        await desk.units.unit_hold(name, 200.0)  # and its window is never heard of again
+        facts = await desk.until(name, lambda facts: facts["outcome"])
+        assert facts["outcome"] == "stops by its ramp"
+        await desk.until(name, lambda facts: facts["position"] is not None and facts["position"] > 70)
+
+    with served(model) as address:
+        at_desk(tmp_path, scene)
+
+
+def test_the_same_line_to_two_units(tmp_path: Path) -> None:
+    async def scene(desk: Desk) -> None:
+        names = [await desk.units.unit_connect("gs-c200", address) for address in (first, second)]
+        told = await desk.units.unit_both(names, "V1")
+        assert [one["answers"] for one in told] == [("V0",), ("V0",)]
+        assert all(one["ms"] > 0 for one in told)  # type: ignore[operator]
+        told = await desk.units.unit_both(names, "nonsense")
+        assert all(one["refused"] for one in told)
+
+    with served("gs-c200") as first, served("gs-c200") as second:
+        at_desk(tmp_path, scene)
+
+
+def test_program_and_backup(tmp_path: Path) -> None:
+    async def scene(desk: Desk) -> None:
+        name = await desk.units.unit_connect("dcb-274", address, "patience=2")
+        told = await desk.units.unit_store(name, "+ 500\nW 0\n", save=False)
+        assert told.startswith("2 instructions")
+        assert await desk.units.unit_compare(name, "+ 500\nW 0\n") == []
+        assert await desk.units.unit_compare(name, "+ 501\nW 0\n")
+        assert "+ 500" in await desk.units.unit_source(name)
+        with pytest.raises(ValueError, match="no command"):
+            await desk.units.unit_store(name, "nonsense\n")
+        assert await desk.units.unit_backup(name, "kept.toml") == "kept.toml"
+        with pytest.raises(FileExistsError):
+            await desk.units.unit_backup(name, "kept.toml")
+        await desk.units.unit_store(name, "- 7\n")
+        seen = await desk.units.unit_differs(name, "kept.toml")
+        assert seen["lines"]
+        with pytest.raises(ValueError, match="changed since"):
+            await desk.units.unit_restore(name, "kept.toml", "something else")
+        told_lines = await desk.units.unit_restore(name, "kept.toml", str(seen["seen"]))
+        assert Path(told_lines[-1].split()[-1]).is_file()
+        assert await desk.units.unit_compare(name, "+ 500\nW 0\n") == []
+
+    with served("dcb-274", pace=100) as address:
+        at_desk(tmp_path, scene)
+
+
+def test_stop_comes_before_what_is_pending(tmp_path: Path) -> None:
+    """The line I of a GenStepper board is answered when the motor stands (manual, page 27): STOP does not wait."""
+
+    async def scene(desk: Desk) -> None:
+        name = await desk.units.unit_connect("bs0610", address, "motor=X patience=2")
+        pending = asyncio.create_task(desk.units.unit_say(name, "+SI"))
+        facts = await desk.until(name, lambda facts: facts["job"])
+        with pytest.raises(UnitBusy, match="under way"):
+            await desk.units.unit_say(name, "X")
+        while "'command', 'I'" not in str((await desk.units.unit_talk(name))["rows"]):
+            await asyncio.sleep(0.01)
+        assert (await desk.stopping.stop_all())[0].startswith(name)
+        with pytest.raises(UnitBusy, match="broken off"):
+            await pending
+        facts = await desk.until(name, lambda facts: facts["moving"] is False)
+        assert facts["position"] is not None
+
+    with served("bs0610", pace=1) as address:
+        at_desk(tmp_path, scene)
+
+
+@pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "bs0610", "supersigma"])
+def test_a_unit_that_stalls_is_unknown_and_stop_says_that_it_was_not_confirmed(tmp_path: Path, model: str) -> None:
+    async def stall(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        while await reader.read(100):
+            pass
+        writer.close()
+
+    async def scene(desk: Desk) -> None:
+        async with strange(stall) as address:
+            name = await desk.units.unit_connect(model, address, "patience=0.02")
+            facts = await desk.until(name, lambda facts: facts["trouble"])
+            assert facts["position"] is None
+            assert facts["state"] is None
+            with pytest.raises(StopFailed, match="switch off the supply"):
+                await desk.stopping.stop_all()
+            await desk.units.close()
+
+    at_desk(tmp_path, scene)
+
+
+@pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "bs0610"])
+def test_a_unit_that_babbles_or_lies_is_unknown(tmp_path: Path, model: str) -> None:
+    async def babble(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        while data := await reader.read(100):
+            writer.write(b"\xffV+1\x00x" + data[::-1] + b"~")
+        writer.close()
+
+    async def scene(desk: Desk) -> None:
+        async with strange(babble) as address:
+            name = await desk.units.unit_connect(model, address, "patience=0.02")
+            facts = await desk.until(name, lambda facts: facts["trouble"])
+            assert facts["position"] is None
+            await desk.units.close()
+
+    at_desk(tmp_path, scene)
+
+
+def test_a_port_that_is_lost_shows_at_once_and_is_spoken_to_only_when_asked(tmp_path: Path) -> None:
+    came: list[asyncio.StreamWriter] = []
+    heard = bytearray()
+
+    async def listen(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        came.append(writer)
+        while data := await reader.read(100):
+            heard.extend(data)
+
+    async def scene(desk: Desk) -> None:
+        async with strange(listen) as address:
+            name = await desk.units.unit_connect("gs-c200", address, "patience=0.02")
+            await desk.until(name, lambda facts: facts["trouble"])
+            await desk.units.unit_asking(name, True)
+            came[0].close()
+            facts = await desk.until(name, lambda facts: facts["lost"])
+            assert facts["position"] is None
+            before = bytes(heard)
+            with pytest.raises(UnitBusy, match="port is gone"):
+                await desk.units.unit_say(name, "V1")
+            await asyncio.sleep(0.3)  # three looks at the port
+            assert (len(came), bytes(heard)) == (1, before)
+            await desk.units.unit_again(name)
+            assert not desk.facts(name)["lost"]
+            await desk.until(name, lambda facts: len(heard) > len(before))
+            await desk.units.close()
+            for writer in came:
+                writer.close()
+
+    at_desk(tmp_path, scene)
