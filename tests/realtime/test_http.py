@@ -202,6 +202,12 @@ def test_what_other_computers_reach_needs_a_token(host: str) -> None:
         HttpControl(control, TcpAddress(host, 0))
 
 
+@pytest.mark.parametrize("host", ["0.0.0.0", "127.0.0.1"])
+def test_a_token_that_can_be_guessed_is_refused(host: str) -> None:
+    with controlled(one()) as control, pytest.raises(EndpointError, match="too short; at least 8"):
+        HttpControl(control, TcpAddress(host, 0), "x")
+
+
 def test_a_token_opens_it_to_other_computers() -> None:
     with controlled(one()) as control:
         http = HttpControl(control, TcpAddress("0.0.0.0", 0), TOKEN)

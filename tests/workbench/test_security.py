@@ -150,6 +150,27 @@ def test_a_way_back_with_two_slashes_leads_to_no_other_machine(open_to_all: Guar
     assert dict(answer["headers"])[b"location"] == b"/evil.example/"
 
 
+@pytest.mark.parametrize(
+    "path", ["/\t/evil.example", "/\n//evil.example", "/\\evil.example", "\\\\evil.example", "/\r\n/x"]
+)
+def test_a_way_back_holds_nothing_that_a_browser_leaves_out(open_to_all: Guard, path: str) -> None:
+    """Browsers drop tabs and line ends in an address, and take backslashes for slashes (URL standard, 4.4)."""
+    headers = dict(ask(open_to_all, HERE, path=path, query="token=a+word+of+my+own")["headers"])
+    location = headers[b"location"].decode()
+    assert location.startswith("/")
+    assert location[1:2] not in ("/", "\\")
+    assert not set(location) & set("\t\r\n\\")
+    assert headers[b"cache-control"] == b"no-store"
+
+
+@pytest.mark.parametrize("origin", ["http://[", "http://[::1", "http://]", "//", "", "http://127.0.0.1:8080\t", "\x00"])
+def test_an_origin_that_cannot_be_understood_is_refused(loopback: Guard, origin: str) -> None:
+    message = ask(loopback, HERE, ("origin", origin))
+    assert message["status"] == 403
+    assert b"content-security-policy" in dict(message["headers"])
+    assert status(loopback, HERE, ("origin", origin), kind="websocket") == 1008
+
+
 def test_with_a_token_the_machine_answers_to_its_addresses_and_its_name_only(open_to_all: Guard) -> None:
     cookie = dict(ask(open_to_all, HERE, query="token=a+word+of+my+own")["headers"])[b"set-cookie"].decode()
     pair = ("cookie", cookie.partition(";")[0])

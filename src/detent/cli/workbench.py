@@ -8,6 +8,7 @@ import webbrowser
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
+from secrets import token_urlsafe
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
@@ -58,7 +59,8 @@ def workbench(
     port
         Listen on this port; 0: any free one.
     token
-        Let in only who knows this word of at least 8 characters; the address that is printed has it.
+        Let in only who knows this word of at least 8 characters, on loopback one by chance unless you say; the address
+        that is printed has it.
     open_
         Open the address in the browser of this machine.
     folder
@@ -114,10 +116,12 @@ def workbench(
     from detent.workbench.client import Bench, BenchError
     from detent.workbench.drafts import Drafts
     from detent.workbench.folder import Folder, OutsideFolder
-    from detent.workbench.guard import check_place
+    from detent.workbench.guard import check_place, is_loopback
     from detent.workbench.listening import Place, listen
 
     try:
+        if token is None and is_loopback(host):
+            token = token_urlsafe(16)  # other users of this computer reach loopback, too
         check_place(host, token)
         chosen = Folder(folder if folder is not None else own)
         listening = listen(Place(host, port, token))

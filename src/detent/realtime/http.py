@@ -30,6 +30,7 @@ LONGEST_BODY: Final = 64 << 10  # bytes
 MOST_IGNORED: Final = 1 << 20  # bytes of a longer one that are read before it is turned away
 QUIET: Final = 10.0  # seconds in which a client has to say what it wants
 MOST_CLIENTS: Final = 64  # at once; the next waits
+SHORTEST_TOKEN: Final = 8  # characters
 TOKEN: Final = "DETENT_TOKEN"  # the variable of the environment
 
 
@@ -55,7 +56,9 @@ class HttpControl:
     """Listens at `address` and answers in threads of its own, until it is closed."""
 
     def __init__(self, control: Doer, address: TcpAddress, token: str | None = None) -> None:
-        """Raises EndpointError if the port cannot be had, or is open to others and there is no `token`."""
+        """Raises EndpointError if the port cannot be had, or is open to others without a `token`, or that is short."""
+        if token and len(token) < SHORTEST_TOKEN:
+            raise EndpointError(f"--token or ${TOKEN}: it is too short; at least {SHORTEST_TOKEN} characters")
         if not token and not is_loopback(address.host):
             raise EndpointError(
                 f"{address} is open to other computers: give --token TEXT or ${TOKEN}, or listen on 127.0.0.1"

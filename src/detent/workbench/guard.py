@@ -3,7 +3,8 @@
 - `Host` must be an address or a name of this machine, so that no foreign name that is bent to
   point here (DNS rebinding) opens it.
 - `Origin`, which browsers add, must be the workbench itself; a WebSocket and whatever changes something needs it.
-- On any address but loopback a token is needed: once in the address (``?token=``), from then on as a cookie.
+- A token is needed: once in the address (``?token=``), from then on as a cookie. `detent workbench` makes one where
+  none is given: loopback is open to every user of the machine.
 
 Everything that is answered carries a policy that forbids the browser to load anything from elsewhere.
 """
@@ -14,13 +15,14 @@ import socket
 from collections.abc import Collection, Iterable
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
-from urllib.parse import parse_qsl, urlencode, urlsplit
+from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from detent.realtime.http import SHORTEST_TOKEN
+
 LOOPBACK_NAMES = ("localhost",)
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
-SHORTEST_TOKEN = 8
 
 _POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
@@ -105,8 +107,8 @@ class Guard:
             if kind == "websocket" or method not in SAFE_METHODS:
                 raise Refusal(403, "The request does not say which page it comes from (Origin).")
             return
-        origin = urlsplit(origins[0])
-        if len(origins) != 1 or origin.scheme not in ("http", "https") or origin.netloc.lower() != hosts[0].lower():
+        own = [f"{scheme}://{hosts[0].lower()}" for scheme in ("http", "https")]
+        if len(origins) != 1 or origins[0].lower() not in own:
             raise Refusal(403, "The request comes from a page of another origin.")
 
     def check_token(self, query: str, headers: Iterable[tuple[str, str]]) -> bool:
@@ -148,10 +150,16 @@ class Guard:
     async def _welcome(self, scope: Scope, headers: Iterable[tuple[str, str]], send: Send) -> None:
         """Put the token into a cookie and lead to the same place without it."""
         left = [pair for pair in parse_qsl(scope["query_string"].decode("latin-1")) if pair[0] != "token"]
-        # only a path: two slashes at its beginning would lead to another host
-        place = "/" + scope["path"].lstrip("/\\") + (f"?{urlencode(left)}" if left else "")
+        # only a path: two slashes at its beginning would lead to another host, and browsers drop tabs and line ends
+        # between them
+        place = "/" + quote(scope["path"].lstrip("/\\"), errors="replace") + (f"?{urlencode(left)}" if left else "")
         cookie = f"{self._cookie_name}={self._cookie.decode()}; Path=/; HttpOnly; SameSite=Lax; Max-Age=2592000"
-        answer = [(b"location", place.encode("latin-1", "replace")), (b"set-cookie", cookie.encode()), *_HEADERS]
+        answer = [
+            (b"location", place.encode()),
+            (b"set-cookie", cookie.encode()),
+            (b"cache-control", b"no-store"),
+            *_HEADERS,
+        ]
         await send({"type": "http.response.start", "status": 303, "headers": answer})
         await send({"type": "http.response.body", "body": b""})
 

@@ -186,7 +186,7 @@ def test_a_host_program_is_served_at_the_address_that_the_panel_shows(window: Wi
             answer += os.read(client, 100)
     finally:
         os.close(client)
-    window.page.goto(workbench.url.rstrip("/") + "/terminal")
+    window.page.goto(workbench.url.replace("/?", "/terminal?"))
     window.page.get_by_role("tab", name="drill").click()
     window.page.locator(".said.host").first.wait_for()
 

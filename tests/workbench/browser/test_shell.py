@@ -92,7 +92,9 @@ UPGRADE = ("Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 
 
 def test_a_foreign_name_or_origin_is_refused_by_the_server_itself(workbench: Served) -> None:
     own = workbench.url.split("/")[2]
-    assert " 200 " in ask(workbench.url, "GET / HTTP/1.1", f"Host: {own}")
+    token = workbench.url.partition("?")[2]
+    assert " 303 " in ask(workbench.url, f"GET /?{token} HTTP/1.1", f"Host: {own}")
+    assert " 401 " in ask(workbench.url, "GET / HTTP/1.1", f"Host: {own}"), "on loopback, too: others have a door there"
     assert " 403 " in ask(workbench.url, "GET / HTTP/1.1", "Host: evil.example")
     sockets = ("/live", "/scope-feed", "/_nicegui_ws/socket.io/?EIO=4&transport=websocket")
     for path in sockets:

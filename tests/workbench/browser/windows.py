@@ -67,7 +67,8 @@ class Window:
 
     def open(self, path: str = "/") -> "Window":
         """Load a page and wait until it shows live values."""
-        self.page.goto(self.url.split("?")[0].rstrip("/") + path)
+        base, _, token = self.url.partition("?")
+        self.page.goto(base.rstrip("/") + path + ("&" if "?" in path else "?") + token)
         self.page.wait_for_function("window.detent && detent.get('now') !== undefined")
         return self
 
