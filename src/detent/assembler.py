@@ -405,8 +405,11 @@ class _Assembler(Generic[Ins]):
 
 
 def assemble(language: Language[Ins], source: str, name: str = "program") -> Assembly[Ins]:
-    """The program in `source`; `name` is what reports call it. Raises AssemblyFailed with every error."""
-    return _Assembler(language, source, name).run()
+    """The program in `source`; `name` is what reports call it. Raises AssemblyFailed with every error.
+
+    The ^Z with which tools of DOS end a file is no part of it.
+    """
+    return _Assembler(language, re.sub(r"\x1a+\s*\Z", "", source), name).run()
 
 
 def listing(assembly: Assembly[Ins]) -> str:

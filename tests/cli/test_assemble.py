@@ -142,7 +142,7 @@ def test_files_of_the_wrong_kind_are_told_apart(source: Path, capsys: pytest.Cap
     assert "byte 0 holds 3Bh, which is no op-code; is it an image" in capsys.readouterr().err
     source.write_bytes(b"G\xff\xff\x80")
     assert status(lambda: asm("gs-c200", source)) == 2
-    assert "byte 1 is not text in UTF-8; is it an image?" in capsys.readouterr().err
+    assert "save it as UTF-8, or use disasm if it is an image" in capsys.readouterr().err
 
 
 def test_an_image_needs_a_file_and_a_folder_that_is_there(
@@ -174,3 +174,36 @@ def test_an_output_never_replaces_what_it_is_made_from(tmp_path: Path, capsys: p
         assert caught.value.code == 2
         assert "is read here, and would be lost: write to another file" in capsys.readouterr().err
         assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize("verb", ["asm", "list"])
+@pytest.mark.parametrize(
+    "source",
+    [
+        b"\xef\xbb\xbfS10\r\n+100\r\n",
+        b"S10\r\n+100\r\n\x1a",
+        b"S10\n+100\x1a\x1a\r\n",
+        b"S10\r\n+100 ; \xc3\xa9\x1a",
+    ],  # fmt: skip,
+)
+def test_sources_of_other_tools_are_read_as_they_are_meant(
+    verb: str, source: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A mark before UTF-8, CR LF, the ^Z behind a file of DOS."""
+    file = tmp_path / "old.gsc"
+    file.write_bytes(source)
+    with pytest.raises(SystemExit) as ended:
+        main([verb, "gs-c200s", str(file)])
+    out, err = capsys.readouterr()
+    assert not ended.value.code, err
+    assert "S10" in out
+    assert "+100" in out
+
+
+def test_a_source_in_latin_1_is_told_with_the_byte(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "old.gsc"
+    file.write_bytes(b"S10\r\n+100 ; \xe9\r\n")
+    with pytest.raises(SystemExit) as ended:
+        main(["asm", "gs-c200s", str(file)])
+    assert ended.value.code == 2
+    assert "byte E9 on line 2, column 8; save it as UTF-8" in capsys.readouterr().err

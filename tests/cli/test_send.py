@@ -154,6 +154,22 @@ def test_a_program_of_a_dcb_274_is_traced_as_it_runs(capsys: pytest.CaptureFixtu
     assert "+ 10" in next(line for line in out.splitlines() if line.startswith("|"))
 
 
+def test_a_sequence_that_is_refused_leaves_no_program_mode_behind(capsys: pytest.CaptureFixture[str]) -> None:
+    with served("dcb-274") as service:
+        port = address(service)
+        _, err = told(capsys, "dcb-274", port, "--patience", "2", "P 0", "A 8", "A 1000", status=1)
+        assert "a line was refused: program mode was ended (P)" in err
+        out, _ = told(capsys, "dcb-274", port, "--patience", "2", "X")
+        assert "n=" in out
+    with served("gs-c200s") as service:
+        _, err = told(capsys, "gs-c200s", address(service), "Po", "A1", "A9", status=1)
+        assert "programming mode was left (Px)" in err
+        told(capsys, "gs-c200s", address(service), "V1")
+    with served("gs-c200") as service:
+        _, err = told(capsys, "gs-c200", address(service), "P", "A9", status=1)
+        assert "E leaves it, and starts the program" in err
+
+
 def test_single_characters_of_the_dcb_274_are_typed_as_words(capsys: pytest.CaptureFixture[str]) -> None:
     with served("dcb-274") as service:
         out, _ = told(capsys, "dcb-274", address(service), "--patience", "1", "M 1000", "@", "ESC", "^C", "^N B", "X")

@@ -169,3 +169,17 @@ class TestAssembly:
                 gone = origin + 6000 - float(x.positions[x.times <= t][-1])
                 slope = distance / 600
                 assert abs(position - origin - start - gone * slope) < 1 + slope
+
+
+def test_the_wait_of_the_page_comes_at_any_time() -> None:
+    """docs/how-to/test-host-software.md waits for the drill at 150, in a cell that goes on with bar after bar."""
+    page = (EXAMPLES.parent / "docs" / "how-to" / "test-host-software.md").read_text()
+    assert "serve examples/drilling/bar-after-bar.toml --control" in page
+    assert "wait --unit drill --position 150" in page
+    folder = EXAMPLES / "drilling"
+    text = (folder / "bar-after-bar.toml").read_text()
+    cell = build(parse(text, "bar-after-bar.toml"), lambda file: (folder / file).read_text())
+    cell.run_to(20 * SECOND)
+    drill = pulses(cell, "drill")
+    assert len(drill) > 10 * 600  # down and up, 300 steps each: it is at 150 twice a hole, to the end
+    assert drill[-1] > 18 * SECOND

@@ -3,6 +3,7 @@
 import json as json_text
 import sys
 from collections.abc import Iterable
+from errno import EILSEQ
 from pathlib import Path
 from typing import Any, Literal
 
@@ -135,11 +136,13 @@ def _language(model: str) -> Language[Any]:
 def _assembly(model: str, file: Path, json: bool) -> Assembly[Any]:
     """The assembled source; every error of it is reported before the program ends."""
     language = _language(model)
+    from detent.realtime.texts import read_text
+
     try:
-        source = _read(file).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        hint = "is it an image? Then use disasm"
-        raise _asked_wrongly(f"{file}: byte {error.start} is not text in UTF-8; {hint}") from error
+        source = read_text(file)
+    except OSError as error:
+        hint = ", or use disasm if it is an image" if error.errno == EILSEQ else ""
+        raise _asked_wrongly(f"{file}: {error.strerror or error}{hint}") from error
     try:
         return assemble(language, source, str(file))
     except AssemblyFailed as failed:

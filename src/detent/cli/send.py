@@ -1,6 +1,7 @@
 """The verb `send`: one exchange with a unit, real or emulated, from the command line."""
 
 import json as json_text
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -27,7 +28,7 @@ def send(
     Each line goes out as its protocol demands: with checksum and CR, character by character, with the name of the
     axis. A line that begins with a hyphen stands behind `--`: detent send gs-c200 /dev/ttyUSB0 -- -100
 
-    Ends with 1 if a line was refused or not answered.
+    Ends with 1 if a line was refused, ignored or not answered; program mode that the lines have begun is ended then.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def send(
     """
     from detent.cli.target import asked_wrongly
     from detent.cli.unit import unit as connected
-    from detent.hosts.typed import MOTION, say
+    from detent.hosts.typed import MOTION, leave, say
     from detent.hosts.typed import raw as exchange
 
     try:
@@ -89,6 +90,8 @@ def send(
                     told.append({"sent": line, **facts, **({"printed": printed} if printed else {})})
                     if not json:
                         print(f"> {line}\n{shown(said)}", flush=True)
+                if refused and (left := found.perform(leave(found.driver))):
+                    print(f"detent: a line was refused: {left}", file=sys.stderr)
     finally:  # what was said before something failed has been said, and may have moved something
         if json and told:
             print(json_text.dumps({"model": model, "port": port, "exchanges": told}), flush=True)

@@ -57,6 +57,23 @@ def say(driver: Driver, line: str, seconds: float = MOTION, heard: Heard = unhea
     yield
 
 
+def leave(driver: Driver) -> Steps[str]:
+    """Out of program mode, if what was said has led there, so that nothing is left half open; what was done, in words.
+
+    A GS-C200 can only be told of: E leads out, and starts the program.
+    """
+    if isinstance(driver, Dcb274) and driver.programming:
+        yield from driver.command("P")
+        driver.programming = False
+        return "program mode was ended (P)"
+    if isinstance(driver, GsC200) and driver.programming:
+        if not driver.signed:
+            return "it is in programming mode still: E leaves it, and starts the program; or switch it off and on"
+        yield from driver.leave_programming()
+        return "programming mode was left (Px), the program is not started"
+    return ""
+
+
 def raw(data: bytes, seconds: float) -> Steps[bytes]:
     """Send bytes as they are; everything that comes within so many seconds."""
     yield Clear()
@@ -205,6 +222,8 @@ def _dcb274(driver: Dcb274, text: str, seconds: float, heard: Heard) -> Steps[Sa
         ended = yield from _listen(driver, seconds, heard)
         return Said((), "the program has ended" if ended else "the program still runs; ESC ends it, @ slows down")
     answer = yield from driver.command(text, seconds)
+    if re.fullmatch(r"P ?\d*", text):
+        driver.programming = text != "P"
     return Said((answer,) if answer.strip() else (), "" if answer.strip() else "done")
 
 

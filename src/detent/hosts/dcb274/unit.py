@@ -57,6 +57,7 @@ class Unit(Axis):
         self.name = name
         self.title = self._way.title
         self.version = ""  # as the sign-on line tells
+        self.programming = False  # a line of ours has begun program mode: lines are stored
         self._connected = False
         self._stops = 0  # how often the axis was stopped
         self._times_told = 0  # how often it was told to do something else
