@@ -69,3 +69,52 @@ def test_no_axis_passes_its_limits() -> None:
 @pytest.mark.slow
 def test_no_axis_passes_its_limits_in_many_sessions() -> None:
     assert sum(run(seed) for seed in range(100, 400)) > 300
+
+
+def asked_while_late(seed: int) -> int:
+    """A motion meets its limit while the computer is elsewhere, and its host asks on; how many stops there were.
+
+    What was said after the stop, before it was heard of, is not so: no host hears it. Nothing is stored twice.
+    """
+    random = Random(seed)
+    edge, rate = random.randrange(30, 300), random.randrange(200, 2000)
+    stored: list[bytes] = []
+
+    def store(_: str, image: bytes) -> bool:
+        stored.append(image)
+        return True
+
+    text = CELL.format(lead=random.choice([5, 10, 30]))
+    switches = {"x.LIMIT-A": ("x", edge, 10**6)}
+    with Bench(text, switches=switches, store=store, jitter=lambda: random.randrange(300 * US)) as bench:
+        bench.run(100 * MS)
+        bench.type("x", " ")
+        bench.run(200 * MS)
+        bench.type("x", random.choice([f"M {rate}", f"+{3 * edge}"]))
+        while bench.position("x") < edge - random.randrange(2, 12) and bench.driven.axes()[0].moving:
+            bench.run(1 * MS)
+        asked = [random.choice(["Z 0", "^", "S", "Z 0"]) for _ in range(random.randrange(1, 5))]
+        for question in asked:
+            bench.type("x", question)
+            if random.random() < 0.5:
+                bench.run(random.randrange(1, 20 * MS))
+            bench.stall(random.randrange(100 * MS) if random.random() < 0.9 else 400 * MS)
+        bench.rest()
+        bench.type("x", "Z 0")
+        bench.run(200 * MS)
+        assert bench.driven.escaped == 0, bench.news
+        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        state = bench.driven.axes()[0]
+        assert state.shaft == bench.position("x") <= edge
+        assert len(stored) <= asked.count("S")
+        return state.stops
+
+
+def test_what_is_said_while_the_computer_is_late_waits_for_what_happened_meanwhile() -> None:
+    assert run(151) == 1
+    assert sum(asked_while_late(seed) for seed in range(15)) > 10
+
+
+@pytest.mark.slow
+def test_many_questions_while_the_computer_is_late() -> None:
+    assert sum(asked_while_late(seed) for seed in range(100, 400)) > 200

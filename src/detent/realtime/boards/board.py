@@ -299,7 +299,7 @@ class Board:
             for out in self.outs.values():
                 at = out.deadline()
                 if at is not None and wall >= at:
-                    out.commit(wall)
+                    out.commit(wall, self.heard())
             for axis in self.steppers.values():
                 at = axis.proof_due()
                 if at is not None and wall >= at:
@@ -314,11 +314,28 @@ class Board:
             stop.commit(wall)
         for axis in self.steppers.values():
             axis.commit(now, wall)
+        unheard = False
+        heard = self.heard()
         for out in self.outs.values():
-            out.commit(wall)
+            unheard |= out.commit(wall, heard)
+        if unheard:
+            self.inquire(wall)
         for driver in self.drivers.values():
             driver.commit(wall)
         self.core.link.flush(wall)
+
+    def heard(self) -> WallNs | None:
+        """Whatever its stops did up to this wall time was told; None: none of them can do anything."""
+        if self.state is not State.READY:
+            return None
+        return min((at for stop in self.stops.values() if (at := stop.heard()) is not None), default=None)
+
+    def inquire(self, wall: WallNs) -> None:
+        """Have something acknowledged, so that `heard` comes on; what is under way already will be."""
+        link = self.core.link
+        if self.heard() is not None and link.idle:
+            self.core.command("get_uptime")  # nobody else asks for it here, so that no answer is mistaken
+            link.flush(wall)
 
     # -- at the start
 

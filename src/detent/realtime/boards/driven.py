@@ -8,7 +8,6 @@ certain.
 
 from collections.abc import Sequence
 
-from detent.realtime.boards.leaving import CERTAIN
 from detent.realtime.boards.mishaps import Mishaps
 from detent.realtime.boards.several import COMMIT_EVERY
 from detent.realtime.boards.states import AxisState, BoardState, Standing
@@ -74,7 +73,10 @@ class Driven(Mishaps):
         behind = self._behind  # what was said and stored before that is certain
         held = min((line.first for line in self.lines), default=NEVER)
         tail = min((axle.guard.next for axle in self.axles), default=NEVER)
-        cell = min(tail, held, self._stores.first) + behind
+        first = min(held, self._stores.first)
+        if first + behind <= self.cell.now and self._horizon() < first:
+            first = self.cell.now + COMMIT_EVERY - behind  # the boards were asked, and what they answer wakes it
+        cell = min(tail, first) + behind
         if cell < NEVER:
             at = cell + self._align if at is None else min(at, cell + self._align)
         return at
@@ -92,6 +94,7 @@ class Driven(Mishaps):
         for event in events:
             self._happened(event)
         self._absorb()
+        self._inquire()
         over = self._stores.first <= self._horizon()
         if events or over or wall - self._looked >= COMMIT_EVERY:
             self._looked = wall
@@ -125,9 +128,7 @@ class Driven(Mishaps):
                     self._place(axle, sent)
 
     def _forget(self) -> None:
-        oldest = self.past.forget(
-            min((self._left(axle) for axle in self.axles), default=self.cell.now) - CERTAIN - SLACK
-        )
+        oldest = self.past.forget(self._certain() - SLACK)
         if oldest is None:
             return
         counts = iter(oldest.counts)

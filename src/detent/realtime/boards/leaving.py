@@ -26,9 +26,10 @@ from detent.realtime.boards.setup import SetupProblem
 from detent.realtime.boards.several import Boards
 from detent.realtime.boards.states import News, Standing, Weight
 from detent.realtime.pace import Pace, WallNs
-from detent.ticks import MS, Ns
+from detent.ticks import MS, NEVER, Ns
 
-CERTAIN: Ns = 5 * MS  # a stop is known so long after it happened
+CERTAIN: Ns = 5 * MS  # a stop is known so long after it happened, unless the computer was late
+REPORTING: Ns = 1 * MS  # what a board takes to tell a stop, while it acknowledges something
 KEEP: Ns = 50 * MS  # between two moments to which the cell can be taken back, while a stop is armed
 
 
@@ -56,7 +57,7 @@ class Leaving:
         assert cell.recording is not None
         self.cell, self.boards, self.plan, self._wall, self._tell = cell, boards, plan, wall, tell
         self._stores = stores
-        stores.now, stores.holding, stores.failed = lambda: cell.now, lambda: self._guarded, self._not_written
+        stores.now, stores.holding, stores.failed = lambda: cell.now, self._may_stop, self._not_written
         self._outs: dict[tuple[int, str], Out] = {
             (cell.unit(unit), pin): Out(name, cell.unit(unit)) for (unit, pin), name in plan.outs.items()
         }
@@ -157,10 +158,30 @@ class Leaving:
         return self.plan.lead + self.lag + CERTAIN if self.plan.held else 0
 
     def _horizon(self) -> Ns:
-        """What the cell said up to then is certain: no stop can be earlier."""
+        """What the cell said up to then may leave."""
+        return self._certain() if self.plan.held else self.cell.now
+
+    def _certain(self) -> Ns:
+        """What the cell did up to then is certain: no stop can be earlier that is not known."""
+        left = min((self._left(axle) for axle in self.axles), default=self.cell.now - self.plan.lead)
+        return left - max(CERTAIN, self._unheard())
+
+    def _unheard(self) -> Ns:
+        """How long ago a stop may have happened of which nothing was heard: what a late computer has yet to read."""
+        heard = self.boards.heard()
+        return 0 if heard is None else self._wall() - heard + REPORTING
+
+    def _may_stop(self) -> bool:
+        """Whether a stop may yet take back what the cell does now."""
+        return self._guarded or self.boards.heard() is not None
+
+    def _inquire(self) -> None:
+        """Hear of what the boards did lately, where words or images wait for nothing else."""
         if not self.plan.held:
-            return self.cell.now
-        return min((self._left(axle) for axle in self.axles), default=self.cell.now - self.plan.lead) - CERTAIN
+            return
+        first = min(self._stores.first, *(line.first for line in self.lines), NEVER)
+        if first <= self.cell.now - self._behind and first > self._horizon():
+            self.boards.inquire(self._wall())
 
     def _counts(self) -> tuple[int, ...]:
         return (

@@ -23,6 +23,7 @@ NAK_QUIET: WallNs = 3 * MS  # requests that follow each other so closely are abo
 class _Sent(NamedTuple):
     sequence: int  # not wrapped
     data: bytes
+    at: WallNs  # first sent
 
 
 class Link:
@@ -49,6 +50,7 @@ class Link:
         self._again_at: WallNs | None = None
         self._patience = FIRST_PATIENCE
         self._repeated_at: WallNs | None = None
+        self.heard: WallNs = 0  # what the board had said up to then has come: it acknowledged what was sent then
         self._acked = -1  # the highest number, not wrapped, that came with an empty block
         self._proven = False  # a block of ours was acknowledged under its number
 
@@ -100,7 +102,7 @@ class Link:
                 break
             for _ in range(count):
                 self._waiting.popleft()
-            self._under_way.append(_Sent(self._next, data))
+            self._under_way.append(_Sent(self._next, data, wall))
             self._bytes_under_way += len(data)
             self._next += 1
             self._out += data
@@ -173,7 +175,9 @@ class Link:
         if not found.payload:
             self._acked = first + behind
         for _ in range(behind):
-            self._bytes_under_way -= len(self._under_way.popleft().data)
+            taken = self._under_way.popleft()
+            self._bytes_under_way -= len(taken.data)
+            self.heard = taken.at
         self._repeated_at = None
         self._patience = FIRST_PATIENCE
         self._again_at = wall + self._patience if self._under_way else None
@@ -184,7 +188,7 @@ class Link:
         self._under_way.clear()
         self._next = self._acked = sequence
         for sent in old:
-            self._under_way.append(_Sent(self._next, block(self._next, sent.data[2:-3])))
+            self._under_way.append(_Sent(self._next, block(self._next, sent.data[2:-3]), sent.at))
             self._next += 1
         self._repeat(wall)
 

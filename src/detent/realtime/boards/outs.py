@@ -77,26 +77,36 @@ class DigitalOut:
 
     # -- what leaves
 
-    def commit(self, wall: WallNs) -> None:
-        """Give the board what is due soon, and the watchdog its food."""
+    def commit(self, wall: WallNs, heard: WallNs | None = None) -> bool:
+        """Give the board what is due soon, and the watchdog its food. Whether a change waits for `heard`.
+
+        That is the wall time up to which stops of the board have been heard of (None: there are none). What is late
+        already waits for it, as one that took place meanwhile would take it back.
+        """
         if self.dead:
-            return
+            return False
         core = self._core
         soonest = core.soonest(wall)
         if self._back is not None:
             self._correct(self._back, soonest, wall)
         horizon = soonest + core.ticks(max(HOLD - core.setup.margin, core.setup.margin))
+        known = None if heard is None else core.clock.tick_at(heard)
+        waits = False
         while self._pending and self._pending[0].tick <= horizon:
+            if known is not None and known < self._pending[0].tick < soonest:
+                waits = True
+                break
             change = self._pending.popleft()
             if not self._give(change.tick, change.level, soonest, wall):
                 self._pending.appendleft(change)
-                return
+                return False
             self._given.append(change)
         if self._hungry(wall):
             tick = core.unhurried(wall)
             if self._pending and self._pending[0].tick <= tick:
                 tick = soonest  # a change is due before
             self._give(tick, self.level, soonest, wall)
+        return waits
 
     def _correct(self, level: bool, soonest: int, wall: WallNs) -> None:
         """Behind a rewind: what is set for ticks that are given away already cannot come then."""

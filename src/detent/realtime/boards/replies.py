@@ -41,6 +41,8 @@ class HeldLine:
 
     def take(self) -> list[Heard]:
         """What is certain by now, and has not been given."""
+        if not self._held:
+            return []
         horizon, certain = self._horizon(), []
         while self._held and self._held[0].at <= horizon:
             certain.append(self._held.popleft())

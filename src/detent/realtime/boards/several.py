@@ -189,6 +189,16 @@ class Boards:
                 times.append(0)
         return max(min(times), self._committed + COMMIT_EVERY) if times else None
 
+    def heard(self) -> WallNs | None:
+        """Whatever stops did up to this wall time was told; None: none can do anything."""
+        return min((at for board, _ in self._pairs if (at := board.heard()) is not None), default=None)
+
+    def inquire(self, wall: WallNs) -> None:
+        """Have `heard` come on."""
+        for board, port in self._pairs:
+            board.inquire(wall)
+            self._pump(board, port, wall)
+
     def events(self) -> list[Event]:
         """What came back since the last call, in order."""
         found: list[Event] = []

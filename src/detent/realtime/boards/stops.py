@@ -51,6 +51,8 @@ class Stop:
         self._changes.clear()
         self._alive = False  # the trigger can fire
         self._deaf = 0  # not 0: reports may still be of the trigger before
+        self._blind: WallNs | None = None  # since when reports were not listened to, and none has come since
+        self._ignored = False  # a report came meanwhile
         self._quieting = 0  # 1: what is armed is nothing, its last word is awaited; 2: one more report
         self._firing: Stopped | None = None
 
@@ -76,6 +78,15 @@ class Stop:
     def firing(self) -> bool:
         """Whether it has fired, and its event is not made yet."""
         return self._firing is not None
+
+    def heard(self) -> WallNs | None:
+        """Whatever it did up to this wall time was told; None: it can do nothing, and all of it was."""
+        if not self._alive:
+            return None
+        if self._firing is not None:
+            return 0  # when that was is not known yet
+        heard = self._core.link.heard
+        return heard if self._blind is None else min(heard, self._blind)
 
     def arm(self, inputs: Mapping[str, bool], at: Ns) -> None:
         """From cell time `at` on, `inputs` stop the stepper when they take their level; replaces what was armed.
@@ -142,14 +153,20 @@ class Stop:
     def _listen_anew(self, wall: WallNs) -> None:
         """A report of the trigger before may still be on its way: behind the answer to this they are of this one."""
         self._deaf += 1
+        self._blind, self._ignored = wall, False
         number = self._deaf
 
         def came(_: Message, __: WallNs) -> None:
             if number == self._deaf:
-                self._deaf = 0
+                self._listen()
 
         oid = next(iter(self._inputs.values())).oid
         self._core.ask("endstop_query_state", "endstop_state", came, wall, oid=oid)
+
+    def _listen(self) -> None:
+        self._deaf = 0
+        if not self._ignored:
+            self._blind = None
 
     def _off(self, watched: _Watched) -> None:
         self._core.command(
@@ -162,7 +179,7 @@ class Stop:
         oid = next(iter(self._inputs.values())).oid
 
         def came(_: Message, __: WallNs) -> None:
-            self._deaf = 0  # this question has taken the place of that one
+            self._listen()  # this question has taken the place of that one
             if self._quieting == 1:
                 self._quieting = 2
 
@@ -177,8 +194,12 @@ class Stop:
 
     def reported(self, message: Message, wall: WallNs) -> None:
         """A trsync_state came."""
-        if not self._alive or self._deaf:
+        if not self._alive:
             return
+        if self._deaf:
+            self._ignored = True  # it may have been of this trigger: the next one says it again
+            return
+        self._blind = None
         if message.number("can_trigger"):
             if self._quieting == 2:
                 self._quiet()
