@@ -231,7 +231,7 @@ def test_a_host_that_was_kept_away_slips_once() -> None:
     # before it nothing is moved, behind it everything by the same
     before = sum(time < slip.at for time, _ in kept["slide"].times)
     scale, steps = made.boards.master.core.scale, made.machine.steps
-    lag = made.boards.steppers["slide"].lag_ticks
+    lag = made.boards.steppers["slide"].lag_at(steps[-1][0])
     for number, ((tick, _, _), (time, _)) in enumerate(zip(steps, kept["slide"].times, strict=True)):
         due = scale.tick(time) + (lag if number >= before else 0)
         assert abs(tick - due) <= 17

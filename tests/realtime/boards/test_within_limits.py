@@ -99,6 +99,7 @@ def asked_while_late(seed: int) -> int:
             if random.random() < 0.5:
                 bench.run(random.randrange(1, 20 * MS))
             bench.stall(random.randrange(100 * MS) if random.random() < 0.9 else 400 * MS)
+        bench.run(100 * MS)
         bench.rest()
         bench.type("x", "Z 0")
         bench.run(200 * MS)
@@ -108,6 +109,10 @@ def asked_while_late(seed: int) -> int:
         assert state.shaft == bench.position("x") <= edge
         assert len(stored) <= asked.count("S")
         return state.stops
+
+
+def test_a_lag_that_is_caught_up_counts_until_its_pulses_have_left() -> None:
+    assert run(174) > 1
 
 
 def test_what_is_said_while_the_computer_is_late_waits_for_what_happened_meanwhile() -> None:

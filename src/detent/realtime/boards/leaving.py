@@ -150,7 +150,7 @@ class Leaving:
     @property
     def lag(self) -> Ns:
         """How much later than the lead the pins are at present: the latest axis."""
-        return max((axle.stepper.lag for axle in self.axles), default=0)
+        return max((axle.stepper.behind(self.cell.now) for axle in self.axles), default=0)
 
     @property
     def _behind(self) -> Ns:
@@ -293,7 +293,7 @@ class Leaving:
             if not axle.what.half or axle.standing is Standing.FAULT:
                 continue
             stage = self._stages.get(axle.name)
-            over = axle.rested is not None and now >= axle.rested + self.plan.lead + axle.stepper.lag
+            over = axle.rested is not None and now >= axle.rested + self.plan.lead + axle.stepper.behind(now)
             if stage is None:
                 half = over
             else:
@@ -336,7 +336,7 @@ class Leaving:
         """The cell time up to which every pulse of an axis has left the pins: sent, and a lead and its lag ago."""
         due = axle.stepper.next_pulse()
         sent = self.cell.now if due is None else min(due - 1, self.cell.now)
-        return sent - self.plan.lead - axle.stepper.lag
+        return sent - self.plan.lead - axle.stepper.behind(self.cell.now)
 
     def _refresh(self) -> None:
         for axle in self.axles:

@@ -73,6 +73,7 @@ class Stepper:
         self._told = 0  # the shaft behind every pulse told of, with those of an open train as sent
         self._sent = 0
         self._lag = 0  # ticks
+        self._trail: tuple[Ns, int] = 0, 0  # the last pulse that came with an earlier lag, and that lag
         self._sent_at: WallNs = 0
         self._not_before = NOWHERE  # no pulse up to this tick: a stop is not in force yet
         self._halted = True  # nothing is sent before `adopt` or `rewind`
@@ -109,10 +110,19 @@ class Stepper:
         """
         return self._lag * SECOND // self._core.frequency
 
-    @property
-    def lag_ticks(self) -> int:
-        """The same in ticks."""
-        return self._lag
+    def behind(self, now: Ns) -> Ns:
+        """So much later than the lead come the pulses that have yet to leave at cell time `now`: `lag`, or one before.
+
+        What a rest has caught up counts from the motion behind it on: pulses of the motion before are still under way.
+        """
+        through, lag = self._trail
+        earlier = lag * SECOND // self._core.frequency
+        return max(self.lag, earlier) if now <= through + self._core.setup.lead + earlier else self.lag
+
+    def lag_at(self, tick: int) -> int:
+        """The lag, in ticks, of a pulse that was on its way at `tick`."""
+        through, lag = self._trail
+        return lag if lag and tick <= self._core.scale.tick(through) + lag else self._lag
 
     @property
     def shaft(self) -> int:
@@ -138,7 +148,7 @@ class Stepper:
         # behind a rewind a motion under way is told again as it was told first: what was given is not given again
         following = max(entry.first, (self._told - entry.shaft) * entry.direction + 1)
         if following == 1 and not self._spans:
-            self._rested(entry.train)
+            self._rested(entry.train, entry.at)
         self._spans.append(_Span(entry.train, following, None, entry.direction, entry.shaft))
 
     def _close(self, last: int) -> None:
@@ -152,12 +162,16 @@ class Stepper:
                 if not self._spans:
                     self._runs = None
 
-    def _rested(self, train: Train) -> None:
+    def _rested(self, train: Train, now: Ns) -> None:
         """A motion begins: the lag of the one before is over if there was time enough between."""
         if not self._lag or not train.segments:
             return
         rest = train.time_of(1) - (self.told_through or 0)
         if self.told_through is None or rest > self.lag + SETTLED:
+            through, earlier = self._trail
+            lead = self._core.setup.lead
+            under_way = now <= through + lead + earlier * SECOND // self._core.frequency
+            self._trail = self.told_through or 0, max(self._lag, earlier) if under_way else self._lag
             self._lag = 0
 
     def over(self, wall: WallNs) -> bool:
@@ -170,7 +184,7 @@ class Stepper:
         self._offset = shaft - self._counted()
         self.rewind(shaft)
         self._regaining = False
-        self._lag = 0
+        self._lag, self._trail = 0, (0, 0)
 
     def rewind(self, shaft: int) -> None:
         """Forget every entry told so far: the firmware has stopped, and counts `shaft`.

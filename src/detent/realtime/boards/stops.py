@@ -211,7 +211,6 @@ class Stop:
     def _fired(self, reason: int, wall: WallNs) -> None:
         core = self._core
         watched = next((one for one in self._inputs.values() if one.reason == reason), None)
-        lag = self._axis.lag_ticks
         self._axis.halt()
         name = watched.setup.name if watched is not None else ""
         level = self._levels.get(name, True)
@@ -222,7 +221,7 @@ class Stop:
             self._off(self._inputs[other])
         self._armed.clear()
         waiting = {("stepper_position", oid) for oid in self._axis.oids}
-        scale = core.scale.later(lag)
+        base = core.scale
 
         def came(message: Message, at: WallNs) -> None:
             waiting.discard((message.name, message.number("oid")))
@@ -237,6 +236,7 @@ class Stop:
                     sample = core.ticks(asked.setup.sample)
                     edge = core.whole(message, "next_clock", at) - sample
                     stop = edge + (asked.setup.samples - 1) * sample
+                    scale = base.later(self._axis.lag_at(stop))
                     self._firing = self._firing._replace(at=scale.time(stop), edge=scale.time(edge), present=present)
             if not waiting and self._firing is not None:
                 core.events.append(self._firing._replace(shaft=self._axis.counted(), levels=levels))
