@@ -8,19 +8,20 @@ SHELL := /bin/bash
 UV := $(shell command -v uv || echo .uv/bin/uv)
 PYTHON := .venv/bin/python
 STAMP := .venv/.installed
-SYSTEM_PACKAGES := sigrok-cli chromium
+SYSTEM_PACKAGES := sigrok-cli chromium npm
+AXE := axe-core@4.14.1
 
-.PHONY: setup system run test test-all check bench lock docs clean
+.PHONY: setup system axe run test test-all check bench lock docs clean
 
 setup: $(STAMP)
 
 run: $(STAMP)
 	@.venv/bin/detent demo
 
-test: check system
+test: check system axe
 	$(PYTHON) -m pytest -n 2 --dist loadgroup -rs
 
-test-all: check system
+test-all: check system axe
 	$(PYTHON) -m pytest -n 2 --dist loadgroup -m "slow or not slow" -rs
 
 check: $(STAMP)
@@ -67,6 +68,12 @@ system:
 	        echo "$$package is not installed: its tests are skipped"; \
 	    fi; \
 	done
+
+# What looks at the pages of the workbench for everybody who cannot see them, or not well.
+axe: $(STAMP)
+	@[ -f .venv/axe/node_modules/axe-core/axe.min.js ] || { echo "Fetching $(AXE) ..."; \
+	    mkdir -p .venv/axe && npm install --silent --no-save --no-audit --no-fund --prefix .venv/axe $(AXE) > /dev/null 2>&1; } \
+	    || echo "could not fetch $(AXE) with npm: its tests are skipped"
 
 clean:
 	rm -rf .venv .uv detent-demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

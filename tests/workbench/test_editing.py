@@ -22,7 +22,7 @@ class Bench:
         picture = {"bar": ("gs-c200", True), "board": ("bs0610", False)}
         self.picture = SimpleNamespace(units={
             name: SimpleNamespace(model=model, title=model, capacity=119 if language else 0, nonvolatile=language,
-                                  line=name)
+                                  file="", line=name)
             for name, (model, language) in picture.items()
         })  # fmt: skip
         self.sources: dict[str, str] = {}

@@ -290,3 +290,56 @@ def test_exports_are_files_that_others_read() -> None:
             await bench.export("pdf")
 
     play(scene)
+
+
+def test_a_host_finds_the_same_link_after_a_crash(tmp_path: Path) -> None:
+    async def scene(bench: Bench) -> None:
+        before = {name: line.endpoints for name, line in bench.picture.lines.items()}
+        assert before["bar"][0].address.startswith(str(tmp_path / "ports" / "cell-"))
+        assert bench.engine_pid is not None
+        os.kill(bench.engine_pid, signal.SIGKILL)
+        with pytest.raises(BenchError, match="signal 9"):
+            await bench.until(lambda state: False)
+        await bench.revive()
+        assert {name: line.endpoints for name, line in bench.picture.lines.items()} == before
+        host = Terminal(before["bar"][0].address)
+        await bench.go()
+        host.write(b"\xf2V1:")
+        host.close()
+
+    play(scene, state_dir=tmp_path)
+
+
+def test_a_port_that_was_any_is_the_same_one_after_a_crash() -> None:
+    async def scene(bench: Bench) -> None:
+        before = bench.picture.lines["bar"].endpoints
+        assert bench.engine_pid is not None
+        os.kill(bench.engine_pid, signal.SIGKILL)
+        with pytest.raises(BenchError, match="signal 9"):
+            await bench.until(lambda state: False)
+        await bench.revive()
+        assert bench.picture.lines["bar"].endpoints == before
+
+    play(scene, wanted=[Wanted("tcp", "127.0.0.1:0")])
+
+
+def test_faults_are_set_by_the_words_of_the_control_api_stand_and_are_mended_and_belong_to_the_past() -> None:
+    async def scene(bench: Bench) -> None:
+        at = bench.state.now
+        one = await bench.breaks({"where": "start", "kind": "stuck", "level": "0"})
+        two = await bench.breaks({"where": "bar", "kind": "lost", "rate": "0.5", "towards": "host"})
+        assert bench.state.faults == {
+            one: "start: a contact or an input stays at a level (level 0)",
+            two: "bar: a character does not arrive (towards host, rate 0.5)",
+        }
+        with pytest.raises(BenchError, match="no kind of fault 'rust'"):
+            await bench.breaks({"where": "bar", "kind": "rust"})
+        await bench.mend(one)
+        assert list(bench.state.faults) == [two]
+        await bench.rewind(at)
+        assert bench.state.faults == {} or bench.state.now == at
+        await bench.rewind(bench.state.end)
+        await bench.mend()
+        assert bench.state.faults == {}
+
+    play(scene, held=True)

@@ -29,7 +29,8 @@ class Bench:
     """As much of a bench as a script needs: time goes on by a quarter second whenever somebody waits for it."""
 
     def __init__(self) -> None:
-        self.state = SimpleNamespace(now=0)
+        self.units = {"bar": SimpleNamespace(error=None)}
+        self.state = SimpleNamespace(now=0, held=False, speaking={"bar": 0}, units=self.units)
         self.picture = SimpleNamespace(lines={"bar": SimpleNamespace(units=("bar",))})
         self.sent: list[tuple[int, str]] = []
         self.answers = 0
@@ -37,6 +38,8 @@ class Bench:
     async def type(self, unit: str, text: str) -> None:
         if text == "BAD":
             raise RuntimeError("bar has no supply")
+        if text == "T9999":
+            self.units["bar"].error = SimpleNamespace(at=self.state.now, frame=text, reason="T takes 1 to 1000")
         self.sent.append((self.state.now, text))
 
     async def until(self, condition: Callable[[Any], bool]) -> None:
@@ -68,7 +71,7 @@ def run(text: str, then: Callable[[Errands], None] = lambda errands: None) -> tu
 
 def test_commands_go_out_in_order_with_pauses_in_the_time_of_the_cell() -> None:
     bench, live = run("+1\n+2\n@ 1.5\n+3\n")
-    assert bench.sent == [(0, "+1"), (0, "+2"), (3 * SECOND // 2, "+3")]
+    assert bench.sent == [(0, "+1"), (SECOND // 4, "+2"), (7 * SECOND // 4, "+3")]  # the first is heard out
     assert live.get("script.bar") == {"running": False, "line": 0, "told": "done"}
 
 
@@ -81,6 +84,29 @@ def test_a_command_that_cannot_be_sent_ends_the_script_and_says_where() -> None:
     bench, live = run("+1\nBAD\n+2\n")
     assert [text for _, text in bench.sent] == ["+1"]
     assert live.get("script.bar") == {"running": False, "line": 2, "told": "line 2: bar has no supply"}
+
+
+def test_a_script_stops_at_a_refusal_and_says_what_was_refused() -> None:
+    bench, live = run("+1\nT9999\n+2\n")
+    assert [text for _, text in bench.sent] == ["+1", "T9999"]
+    told = "line 2: bar refused T9999: T takes 1 to 1000"
+    assert live.get("script.bar") == {"running": False, "line": 2, "told": told}
+
+
+def test_a_command_is_repeated_at_an_interval_until_it_is_stopped() -> None:
+    bench, live = Bench(), Live()
+
+    async def whole() -> None:
+        errands = Errands(bench, live)  # type: ignore[arg-type]
+        errands.start("bar", "bar", "V1\n@ 1\n@ again")
+        while len(bench.sent) < 3:
+            await asyncio.sleep(0)
+        errands.stop("bar")
+
+    asyncio.run(whole())
+    assert bench.sent[:3] == [(0, "V1"), (5 * SECOND // 4, "V1"), (9 * SECOND // 4, "V1")]
+    with pytest.raises(ValueError, match="line 2: @ again needs a pause"):
+        parse("V1\n@ again")
 
 
 def test_a_script_that_is_stopped_sends_no_more() -> None:

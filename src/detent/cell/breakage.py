@@ -75,6 +75,11 @@ class Faults:
         self._writes_left: dict[int, int] = {}  # fault -> writes that it still spoils; -1: all
         self._dips: dict[str, bool] = {}  # unit without supply -> whether its switch is on
 
+    @property
+    def last(self) -> int:
+        """The number of the fault that came last; 0 if there was none."""
+        return self._count
+
     def known(self, number: int) -> bool:
         """Whether there is, or was, a fault of this number."""
         return 0 < number <= self._count

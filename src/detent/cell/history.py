@@ -29,6 +29,7 @@ from detent.ticks import MS, NEVER, SECOND, Ns
 from detent.uart import Chars
 
 MOST_MOMENTS = 200
+MOST_BRANCHES = 20  # futures that were left, and can be taken again
 KEEP = 400_000  # batches of the recording that can be gone back over
 EVERY = 1_000  # units of work between two moments
 SOONER = 50  # units of work that are enough when a second has passed
@@ -76,6 +77,16 @@ class Cut(NamedTuple):
     at: Ns
     batches: int
     deeds: int
+
+
+class Branch(NamedTuple):
+    """A future that was left: the cell went on from `at` otherwise. It had come as far as `end`, with these deeds."""
+
+    number: int
+    at: Ns
+    end: Ns
+    deeds: Sequence[Action]
+    first: int  # the number of the first of them: some of the instant `at` may have been done before
 
 
 class Moment:
@@ -133,6 +144,8 @@ class History:
         self.once: Address | None = None  # a breakpoint that is gone when it is met
         self.break_on_errors = False
         self.on_notable: Callable[[int, Entry], None] = lambda unit, entry: None
+        self._branches: list[Branch] = []
+        self._branched = 0  # how many there were
         self._moments: list[Moment] = []
         self._look()
         self._moments.append(self._here.copy())
@@ -256,7 +269,8 @@ class History:
             raise Broken(self.broken)
         if self._present is None:
             return
-        here, self._present = self._here, None
+        here, left, self._present = self._here, self._present, None
+        self._keep_branches(here, left.now)
         for unit in self._stores.cut(here.writes):
             self._stores.write_back(unit, here.cell.controller(unit).kept_memory())
         del self._deeds[here.deeds - self._first_deed :]
@@ -362,11 +376,15 @@ class History:
         deed = self._deeds[place].at if place < len(self._deeds) else None
         return min((each for each in (at, deed) if each is not None), default=None)
 
-    def _again(self, moment: Moment, until: Ns) -> None:
-        """What happened up to `until` happens again, to this copy; nobody outside hears of it."""
+    def _again(self, moment: Moment, until: Ns, before: int | None = None) -> None:
+        """What happened up to `until` happens again, to this copy; nobody outside hears of it.
+
+        Only deeds `before` that number, if there is one, are done.
+        """
         cell, stores = moment.cell, self._stores
         writes, stores.writes = stores.writes, moment.writes
-        for action in self._deeds[moment.deeds - self._first_deed :]:
+        last = None if before is None else max(before - self._first_deed, 0)
+        for action in self._deeds[moment.deeds - self._first_deed : last]:
             if action.at > until:
                 break
             cell.run_to(action.at)
@@ -395,6 +413,83 @@ class History:
             for line, deaf in zip(self.cell.lines, self._deaf, strict=True):
                 line.heard[:0] = deaf.heard
             self._do_pending()
+
+    # -- futures that were left ---------------------------------------------------------------------------
+
+    def _keep_branches(self, here: Moment, end: Ns) -> None:
+        """What comes after `here`, as far as `end`, is left; and so is what began there of futures left before."""
+        gone = tuple(self._deeds[here.deeds - self._first_deed :])
+        kept = []
+        for branch in self._branches:
+            if branch.at > here.now or branch.first > here.deeds:
+                way = (*gone[: branch.first - here.deeds], *branch.deeds)
+                branch = branch._replace(at=here.now, deeds=way, first=here.deeds)
+            kept.append(branch)
+        if end > here.now:
+            self._branched += 1
+            kept.append(Branch(self._branched, here.now, end, gone, here.deeds))
+        self._branches = kept[-MOST_BRANCHES:]
+
+    def _fork(self, branch: Branch) -> Moment:
+        """A copy of the cell where that future was left."""
+        before = next(m for m in reversed(self._moments) if m.now <= branch.at and m.deeds <= branch.first).copy()
+        self._again(before, branch.at, branch.first)
+        return before
+
+    @property
+    def branches(self) -> Sequence[Branch]:
+        """Futures that were left and can be taken again, the oldest first: of places that can still be gone back to."""
+        return [branch for branch in self._branches if self._reaches(branch)]
+
+    def _reaches(self, branch: Branch) -> bool:
+        first = self._moments[0]
+        return first.now <= branch.at and first.deeds <= branch.first
+
+    def branch(self, number: int) -> Branch:
+        """The future of that number. Raises KeyError."""
+        for branch in self.branches:
+            if branch.number == number:
+                return branch
+        raise KeyError(f"there is no other future {number}")
+
+    def leave_for(self, number: int) -> Branch:
+        """Stand where that future was left, as the present: what comes after is kept as one more. Raises KeyError."""
+        branch = self.branch(number)
+        self._look()
+        there = self._fork(branch)
+        self._leave_present()
+        self._here = there
+        self._stand_here()
+        return branch
+
+    def follow(self, branch: Branch) -> None:
+        """From where it was left, do what was done then, up to its end. Hosts hear nothing of it."""
+        stops, self.breakpoints = self.breakpoints, set()
+        errors, self.break_on_errors = self.break_on_errors, False
+        self.stopped = ""
+        for action in (*branch.deeds, None):
+            self.run_to(branch.end if action is None else action.at)
+            if action is not None:
+                with suppress(Broken, ValueError, KeyError):  # as it was then
+                    self.do(action.deed)
+        for line in self.cell.lines:
+            line.take()
+        self.breakpoints, self.break_on_errors = stops, errors
+        self._branches = [other for other in self._branches if other.number != branch.number]
+
+    def both(self, number: int) -> tuple[Moment, Moment]:
+        """The cell at the end of that future, or of what has happened if that is earlier: there, and here."""
+        branch = self.branch(number)
+        until, there = min(branch.end, self.end), self._fork(branch)
+        here = there.copy()
+        deeds, first = self._deeds, self._first_deed
+        self._deeds, self._first_deed, self._stores.idle = list(branch.deeds), branch.first, True
+        try:
+            self._again(there, until)
+        finally:
+            self._deeds, self._first_deed, self._stores.idle = deeds, first, False
+        self._again(here, until)
+        return there, here
 
     # -- what happened -----------------------------------------------------------------------------------
 

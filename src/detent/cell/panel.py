@@ -11,7 +11,7 @@ from typing import Self
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
 from detent.cell.recording import Batch, Entry, InputSet
-from detent.controllers.device import Device, Executing, Finished, Powered, Refused, StoreImage
+from detent.controllers.device import Cautioned, Device, Executing, Finished, Powered, Refused, StoreImage
 from detent.pins import Level, PinSet
 from detent.ticks import Ns
 
@@ -69,7 +69,7 @@ class Front:
         return twin
 
     def take(self, entry: Entry) -> bool:
-        """Show one entry. True if somebody may want to stop at it: an instruction, a refusal, supply, a write."""
+        """Show one entry. True if somebody may want to stop at it: instruction, refusal, caution, supply or write."""
         match entry:
             case PinSet(_, pin, level) | InputSet(_, pin, level):
                 self.levels[pin] = level
@@ -84,6 +84,8 @@ class Front:
                 self.executing = None
             case Refused():
                 self.refused = entry
+                return True
+            case Cautioned():
                 return True
             case StoreImage():
                 self.stored += 1

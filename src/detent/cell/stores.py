@@ -24,9 +24,13 @@ class Stores:
         self._kept: list[Stored] = []
         self._begin = 0  # the number of the first that is kept
         self.writes = 0
+        self.idle = False  # what happens is only tried: nothing is written, nothing kept, every write succeeds
 
     def save(self, unit: str, image: bytes) -> bool:
         """Write the image of a unit, or answer as when it was written."""
+        if self.idle:
+            self.writes += 1
+            return True
         place = self.writes - self._begin
         self.writes += 1
         if place < len(self._kept):

@@ -26,7 +26,7 @@ def workbench(
     at: Annotated[str | None, Parameter(show_default=False)] = None,
     *,
     host: str = "127.0.0.1",
-    port: int = 0,
+    port: int | None = None,
     token: str | None = None,
     open_: Annotated[bool, Parameter(name="--open")] = False,
     folder: Path | None = None,
@@ -57,7 +57,8 @@ def workbench(
     host
         Listen on this address. Any but loopback needs --token.
     port
-        Listen on this port; 0: any free one.
+        Listen on this port; 0: any free one. Without it 8274, so that a browser knows the workbench again; if that is
+        taken, the next that is free, and it says so.
     token
         Let in only who knows this word of at least 8 characters, on loopback one by chance unless you say; the address
         that is printed has it.
@@ -117,18 +118,29 @@ def workbench(
     from detent.workbench.drafts import Drafts
     from detent.workbench.folder import Folder, OutsideFolder
     from detent.workbench.guard import check_place, is_loopback
-    from detent.workbench.listening import Place, listen
+    from detent.workbench.listening import USUAL, Place, listen, listen_as_usual
 
     try:
         if token is None and is_loopback(host):
             token = token_urlsafe(16)  # other users of this computer reach loopback, too
         check_place(host, token)
         chosen = Folder(folder if folder is not None else own)
-        listening = listen(Place(host, port, token))
+        listening = listen(Place(host, port, token)) if port is not None else listen_as_usual(host, token)
     except (OutsideFolder, ValueError) as error:
         asked_wrongly(error)
     except OSError as error:
-        asked_wrongly(Problem("", "--host and --port", f"cannot listen on {host}:{port}: {error.strerror or error}"))
+        asked_wrongly(
+            Problem(
+                "",
+                "--host and --port",
+                f"cannot listen on {host}:{USUAL if port is None else port}: {error.strerror or error}",
+            )
+        )
+    if port is None and listening.port != USUAL:
+        told = f"port {USUAL} is taken, by another workbench perhaps: this one is at {listening.port}"
+        print(
+            f"detent: {told}. A browser keeps theme, drafts of lines and the like for each port apart.", file=sys.stderr
+        )
     url = listening.url(token)
 
     async def show() -> None:

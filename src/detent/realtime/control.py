@@ -4,18 +4,18 @@ Nothing here knows who asks. `Control.do` is for the thread that serves; `ask` a
 """
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future
 from concurrent.futures import TimeoutError as TooLate
 from typing import Final
 
-from detent.cell.breakage import Fault, OnLine, StuckPin, StuckSwitch, SupplyDip, WriteFailure
 from detent.cell.deeds import Action
-from detent.lines.faults import BitErrors, CableOut, Delay, LineFault, LostCharacters
 from detent.pins import LOW
-from detent.realtime import verbs
+from detent.realtime import breaking, verbs
 from detent.realtime.boards.driven import Driven
-from detent.realtime.picture import as_json, level_of, pins_of, real_state, switches_of, time_of, whole_state
+from detent.realtime.names import Names
+from detent.realtime.picture import level_of, pins_of, real_state, switches_of, time_of, whole_state
+from detent.realtime.plain import as_json
 from detent.realtime.service import Service
 from detent.realtime.verbs import Answer, AskedWrongly, Json
 from detent.realtime.waiting import Condition, at_position, at_time
@@ -41,6 +41,7 @@ class Control:
             raise ValueError("the service keeps no watch: make it with observed=True")
         self._service, self._cell, self._pace = service, service.cell, service.pace
         self._watched = service.watched
+        self._names = Names(service.cell)
         self._lock = threading.Lock()  # over the two that follow
         self._ended = False
         self._waited_for: set[Future[Answer]] = set()
@@ -161,7 +162,7 @@ class Control:
         return {**whole_state(self._service), "faults": self._list_faults()}
 
     def _pins(self, given: Given) -> Answer:
-        units = [self._unit(given)] if "unit" in given else list(self._cell.wiring.names[: self._cell.wiring.units])
+        units = [self._names.unit(given)] if "unit" in given else list(self._names.units)
         return {"time_ns": self._cell.now, "pins": {unit: pins_of(self._service, unit) for unit in units}}
 
     def _journal(self, given: Given) -> Answer:
@@ -179,26 +180,12 @@ class Control:
         cell = self._cell
         listed: list[Json] = []
         for number, fault in cell.faults.standing.items():
-            found: dict[str, Json] = {"fault": number, **self._describe(fault)}
+            found: dict[str, Json] = {"fault": number, **breaking.told(cell, fault)}
             tally = cell.faults.tally(cell, number)
             if tally is not None:
                 found |= {"met": tally.met, "struck": tally.struck}
             listed.append(found)
         return listed
-
-    def _describe(self, fault: Fault) -> dict[str, Json]:
-        match fault:
-            case OnLine(line, what):
-                kind = next(name for name, made in _ON_LINES.items() if made is type(what))
-                return {"kind": kind, "where": self._cell.wiring.line_names[line], **as_json(what)}
-            case StuckSwitch(switch, level):
-                return {"kind": "stuck", "where": switch, "level": level}
-            case StuckPin(unit, pin, level):
-                return {"kind": "stuck", "where": f"{unit}.{pin}", "level": level}
-            case WriteFailure(unit, times):
-                return {"kind": "eeprom", "where": unit, "times": times}
-            case SupplyDip(unit):
-                return {"kind": "dip", "where": unit}
 
     # -- real pins ---------------------------------------------------------------------------------------
 
@@ -218,7 +205,7 @@ class Control:
             if verb == "fault":
                 unit, _, pin = str(given["where"]).partition(".")
             else:
-                unit, pin = self._pin(given)
+                unit, pin = self._names.pin(given)
             if (unit, pin) in driven.plan.inputs.values():
                 raise AskedWrongly(f"{unit}.{pin} is an input of a board", "its level is that of the pin")
 
@@ -242,12 +229,12 @@ class Control:
     # -- hands -------------------------------------------------------------------------------------------
 
     def _set(self, given: Given) -> Answer:
-        unit, pin = self._pin(given)
-        self._cell.set_pin(unit, pin, _level(given))
+        unit, pin = self._names.pin(given)
+        self._cell.set_pin(unit, pin, breaking.level(given))
         return self._now()
 
     def _release(self, given: Given) -> Answer:
-        unit, pin = self._pin(given)
+        unit, pin = self._names.pin(given)
         self._cell.release(unit, pin)
         return self._now()
 
@@ -258,15 +245,15 @@ class Control:
             raise verbs.unknown("switch", name, list(known))
         if name not in self._cell.wiring.names:
             raise AskedWrongly(f"{name} is moved by a rotor", f"let it stick: fault {name} stuck")
-        self._cell.set_switch(name, _level(given))
+        self._cell.set_switch(name, breaking.level(given))
         return self._now()
 
     def _power(self, given: Given) -> Answer:
-        self._cell.power(self._unit(given), bool(given["on"]))
+        self._cell.power(self._names.unit(given), bool(given["on"]))
         return self._now()
 
     def _type(self, given: Given) -> Answer:
-        unit = self._unit(given)
+        unit = self._names.unit(given)
         self._cell.type(unit, str(given["text"]))
         return self._now()
 
@@ -275,7 +262,7 @@ class Control:
             data = str(given["data"]).encode("latin-1").decode("unicode_escape").encode("latin-1")
         except UnicodeError:
             raise AskedWrongly("data has characters that are no bytes", r"write them like \r or \x1b") from None
-        self._cell.send(self._line(given.get("line")), data)
+        self._cell.send(self._names.line(given.get("line")), data)
         return self._now()
 
     # -- time --------------------------------------------------------------------------------------------
@@ -329,16 +316,16 @@ class Control:
         cell = self._cell
         conditions: list[Condition] = []
         if "state" in given:
-            unit = self._unit(given)
+            unit = self._names.unit(given)
             words = [word.strip() for word in str(given["state"]).split(",")]
-            axis = self._axis(unit, given)
+            axis = self._names.axis(unit, given)
             conditions.append(Condition(lambda: cell.controller(unit).status(cell.now, axis).state in words))
         if "position" in given:
-            unit, position = self._unit(given), given["position"]
+            unit, position = self._names.unit(given), given["position"]
             assert isinstance(position, int)
-            conditions.append(at_position(cell, self._watch, unit, self._axis(unit, given), position))
+            conditions.append(at_position(cell, self._watch, unit, self._names.axis(unit, given), position))
         if "pin" in given:
-            name, text = self._pin(given, outputs=True)
+            name, text = self._names.pin(given, outputs=True)
             level = given.get("level", LOW)
             conditions.append(Condition(lambda: level_of(self._service, name, text) == level))
         elif "level" in given:
@@ -355,36 +342,10 @@ class Control:
     # -- faults ------------------------------------------------------------------------------------------
 
     def _fault(self, given: Given) -> Answer:
-        kind = str(given["kind"])
-        if kind not in verbs.FAULTS:
-            raise verbs.unknown("kind of fault", kind, tuple(verbs.FAULTS))
-        takes = verbs.FAULTS[kind].takes
-        for name in given:
-            if name not in ("where", "kind", "for", *takes):
-                raise AskedWrongly(f"a fault {kind} takes no {name}", f"it takes: {', '.join((*takes, 'for'))}")
         lasting = given.get("for")
         assert lasting is None or isinstance(lasting, int)
-        number = self._cell.breaks(self._broken(kind, str(given["where"]), given), lasting)
+        number = self._cell.breaks(breaking.meant(self._names, given), lasting)
         return {"fault": number, **self._now()}
-
-    def _broken(self, kind: str, where: str, given: Given) -> Fault:
-        """The fault that is meant. Raises AskedWrongly."""
-        options = {name: value for name, value in given.items() if name in verbs.FAULTS[kind].takes}
-        if kind in _ON_LINES:
-            if kind == "delay" and "by" not in options:
-                raise AskedWrongly("by how much do characters come later", "give by, a time")
-            fault: LineFault = _ON_LINES[kind](**options)  # type: ignore[arg-type]
-            return OnLine(self._line(None if where == "line" else where), fault)
-        if kind == "stuck":
-            if "level" not in options:
-                raise AskedWrongly(f"where is {where} stuck", "give level: 0, 1, low or high")
-            if where in switches_of(self._service):
-                return StuckSwitch(where, _level(given))
-            if "." not in where and len(self._units) > 1:
-                raise verbs.unknown("switch", where, [*switches_of(self._service), "UNIT.PIN"])
-            return StuckPin(*self._pin({"pin": where}), _level(given))
-        unit = self._unit({"unit": where})
-        return SupplyDip(unit) if kind == "dip" else WriteFailure(unit, **options)  # type: ignore[arg-type]
 
     def _mend(self, given: Given) -> Answer:
         number = given.get("fault")
@@ -399,73 +360,6 @@ class Control:
             self._cell.mend(one)
         mended: list[Json] = list(numbers)
         return {"mended": mended, **self._now()}
-
-    # -- names -------------------------------------------------------------------------------------------
-
-    @property
-    def _units(self) -> Sequence[str]:
-        return self._cell.wiring.names[: self._cell.wiring.units]
-
-    def _unit(self, given: Mapping[str, object]) -> str:
-        """The unit that is named; the only one, if none is."""
-        name = given.get("unit")
-        if name is None:
-            if len(self._units) > 1:
-                raise AskedWrongly("which unit", f"name one of: {', '.join(self._units)}")
-            return self._units[0]
-        if name not in self._units:
-            raise verbs.unknown("unit", str(name), self._units)
-        return str(name)
-
-    def _axis(self, unit: str, given: Given) -> str:
-        if unit not in self._cell.controllers():
-            raise AskedWrongly(f"{unit} moves no axis", f"name one of: {', '.join(self._cell.controllers())}")
-        axes = self._cell.controller(unit).axes
-        axis = given.get("axis", axes[0])
-        if axis not in axes:
-            if len(axes) == 1:
-                raise AskedWrongly(f"{unit} has no axis {str(axis)!r}", "it has only one: leave the axis out")
-            raise verbs.unknown(f"axis of {unit}", str(axis), axes)
-        return str(axis)
-
-    def _pin(self, given: Given, *, outputs: bool = False) -> tuple[str, str]:
-        """The unit and the pin that UNIT.PIN, or PIN of the only unit, names: an input, or an output too."""
-        text = str(given["pin"])
-        unit, dot, pin = text.rpartition(".")
-        unit = self._unit({"unit": unit} if dot else given)
-        pins = self._cell.parts[self._cell.unit(unit)].pins
-        known = [other.name for other in pins if other.kind.reads or (outputs and other.kind.drives)]
-        if pin not in known:
-            raise verbs.unknown(f"{'pin' if outputs else 'input'} of {unit}", pin, known)
-        return unit, pin
-
-    def _line(self, name: object) -> int:
-        """The line that is named, itself or by a unit on it; the only one, if none is."""
-        wiring = self._cell.wiring
-        names = wiring.line_names
-        if name is None:
-            if len(names) > 1:
-                raise AskedWrongly("which line", f"name one of: {', '.join(names)}")
-            return 0
-        if name in names:
-            return names.index(str(name))
-        if name in self._units and wiring.line_of[self._units.index(str(name))] >= 0:
-            return wiring.line_of[self._units.index(str(name))]
-        raise verbs.unknown("line", str(name), names)
-
-
-_ON_LINES: Final[Mapping[str, type[BitErrors | LostCharacters | Delay | CableOut]]] = {
-    "bit-errors": BitErrors,
-    "lost": LostCharacters,
-    "delay": Delay,
-    "cable-out": CableOut,
-}
-
-
-def _level(given: Given) -> int:
-    level = given["level"]
-    assert isinstance(level, int)
-    return level
 
 
 def _told(action: Action) -> Json:

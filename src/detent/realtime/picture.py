@@ -1,15 +1,16 @@
 """A cell that is served, as plain data: its time, units, pins, lines, switches, motors and recent events."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TypeVar
 
 from detent.cell.breakage import StuckPin, StuckSwitch, contact
 from detent.cell.cell import Cell
 from detent.cell.mechanics import Mechanics
 from detent.cell.switches import Switch
-from detent.controllers.device import Powered, Refused
+from detent.controllers.device import Cautioned, Powered, Refused
 from detent.pins import Level, Pin
 from detent.realtime.boards.driven import Driven
+from detent.realtime.plain import as_json
 from detent.realtime.service import Service
 from detent.realtime.verbs import Answer, Json
 from detent.realtime.watch import Event, Watch
@@ -118,24 +119,6 @@ def switches_of(service: Service) -> dict[str, Json]:
     return found
 
 
-def as_json(record: object) -> dict[str, Json]:
-    """A named tuple as a table; bytes and characters become text, one character a byte. Tuples within it are tables."""
-    assert isinstance(record, tuple)
-    fields: Mapping[str, object] = record._asdict()  # type: ignore[attr-defined]
-    return {name: _value(value) for name, value in fields.items()}
-
-
-def _value(value: object) -> Json:
-    if isinstance(value, bytes):
-        return value.decode("latin-1")
-    if isinstance(value, tuple) and hasattr(value, "_asdict"):
-        return {"kind": type(value).__name__, **as_json(value)}
-    if isinstance(value, (list, tuple)):
-        return [_value(item) for item in value]
-    assert value is None or isinstance(value, (str, int, float, bool))
-    return value
-
-
 def _pins(cell: Cell, unit: int) -> list[Pin]:
     """The inputs, straps and outputs of a unit."""
     return [pin for pin in cell.parts[unit].pins if pin.kind.drives or pin.kind.reads]
@@ -168,7 +151,7 @@ def _motor(cell: Cell, motor: Mechanics) -> Answer:
 
 
 def _events(service: Service) -> list[Json]:
-    """The newest, in order of time: what was refused, supplies, images, characters that faults have changed."""
+    """The newest, in order of time: refusals and cautions, supplies, images, characters that faults have changed."""
     cell = service.cell
     found = [(event.at, cell.wiring.names[unit], _event(event)) for unit, event in _watch(service).events]
     for number, strike in cell.faults.strikes(cell):
@@ -181,6 +164,8 @@ def _events(service: Service) -> list[Json]:
 def _event(event: Event) -> dict[str, Json]:
     if isinstance(event, Refused):
         return {"event": "refused", **as_json(event)}
+    if isinstance(event, Cautioned):
+        return {"event": "caution", **as_json(event)}
     if isinstance(event, Powered):
         return {"event": "on" if event.on else "off", "at": event.at}
     return {"event": "image", "at": event.at, "bytes": len(event.image)}

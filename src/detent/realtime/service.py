@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from fractions import Fraction
+from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from detent.cell.build import build
@@ -19,7 +20,7 @@ from detent.pins import Level
 from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.replies import HeldStores
-from detent.realtime.endpoints.endpoint import Endpoint
+from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
 from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.guarded import Guarded
 from detent.realtime.images import Images
@@ -214,11 +215,18 @@ def _watch(cell: Cell, *, passes_on: bool) -> Watch:
 
 
 def open_endpoints(
-    description: Description, cell: Cell, wanted: Sequence[Wanted], opening: contextlib.ExitStack
+    description: Description,
+    cell: Cell,
+    wanted: Sequence[Wanted],
+    opening: contextlib.ExitStack,
+    *,
+    placed: Mapping[str, Sequence[Wanted]] | None = None,
+    link: Callable[[str], Path] | None = None,
 ) -> list[tuple[int, Endpoint]]:
     """Open what is `wanted` for every line, with the line's number; nothing: what the cell file says, or a pty.
 
-    `opening` closes them. Raises Problem, EndpointError, ValueError.
+    `placed` says it for lines by name instead: those of a service before this one. A pty that nobody has given a place
+    gets the `link` for its line, if that can be had. `opening` closes them. Raises Problem, EndpointError, ValueError.
     """
     names = cell.wiring.line_names
     if not names:
@@ -226,11 +234,20 @@ def open_endpoints(
     outside = [number for number, line in enumerate(cell.lines) if not line.hosted]
     opened: list[tuple[int, Endpoint]] = []
     for place, number in enumerate(outside):
-        for one in _for_line(description, wanted, place, names[number], len(outside)):
+        name = names[number]
+        found = placed.get(name) if placed else None
+        for one in found or _for_line(description, wanted, place, name, len(outside)):
             line = cell.lines[number]
             units = [description.units[cell.wiring.names[unit]].model for unit, _ in cell.wiring.lines[number]]
             echoes = any(model.echoes for name, model in catalogue.MODELS.items() if name in units)
-            endpoint = one.open(names[number], line.format, line.parting, echoes=echoes)
+            endpoint = None
+            if one == Wanted("pty") and link is not None:
+                with contextlib.suppress(EndpointError, OSError):  # another has it: then without
+                    there = link(name)
+                    there.parent.mkdir(parents=True, exist_ok=True)
+                    endpoint = Wanted("pty", str(there)).open(name, line.format, line.parting, echoes=echoes)
+            if endpoint is None:
+                endpoint = one.open(name, line.format, line.parting, echoes=echoes)
             opening.callback(endpoint.close)
             opened.append((number, endpoint))
     return opened

@@ -11,14 +11,14 @@ from typing import Final, TypeVar
 from detent.cell.cell import Cell
 from detent.cell.panel import Front, Panel
 from detent.cell.recording import Entry, Log, Received, Recording
-from detent.controllers.device import Executing, Powered, Refused, StoreImage
+from detent.controllers.device import Cautioned, Executing, Powered, Refused, StoreImage
 from detent.uart import Sent
 
 MOST_EVENTS: Final = 200  # kept
 MOST_SAID: Final = 64  # characters of each unit kept
 MOST_DEEDS: Final = 20_000  # in a journal that forgets
 
-Event = Refused | Powered | StoreImage
+Event = Refused | Cautioned | Powered | StoreImage
 
 T = TypeVar("T")
 

@@ -1,6 +1,8 @@
 """The state of a cell as the table that windows show (see `live`), and the deeds that windows may do to it.
 
-Keys: ``now begin end pace held why past faster late dropped marks crashed title``; for each unit ``u.UNIT.`` and
+Keys: ``now begin end pace held why past faster late dropped marks crashed title queue faults
+branches``; for each unit
+``u.UNIT.`` and
 ``powered state address running error errorat hand reg unsaved stored memory pin.PIN x.AXIS.position|shaft|pulses|rate``
 (a single axis has no name: ``x..position``); for each switch ``s.SWITCH.`` and ``level low high``; for each motor
 ``m.MOTOR.`` and ``place command speed lost``; for each line ``l.LINE.format``. Times are in ns,
@@ -17,6 +19,7 @@ from detent.pins import Level
 from detent.ticks import MS, Ns
 from detent.workbench.live import Live, Value
 from detent.workbench.messages import Mark, State, UnitState
+from detent.workbench.waiting import Waiting
 
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
@@ -66,6 +69,8 @@ def table(state: State) -> dict[str, Value]:
         "late": round(state.lateness.most / MS, 2),
         "dropped": state.dropped,
         "breakerrors": state.break_on_errors,
+        "branches": [list(branch) for branch in state.branches],
+        "faults": [[number, text] for number, text in state.faults.items()],
     }
     for name, unit in state.units.items():
         _unit(values, f"u.{name}", unit)
@@ -101,6 +106,7 @@ def _unit(values: dict[str, Value], key: str, unit: UnitState) -> None:
 
 def _offer(bench: "Bench", live: Live) -> None:
     """What a window may do to the cell."""
+    waiting = Waiting(bench, live)
 
     async def pace(times: Annotated[float, Field(ge=1e-6, le=1e6)] | None) -> None:
         await bench.pace(times)
@@ -120,6 +126,7 @@ def _offer(bench: "Bench", live: Live) -> None:
         await notch(-1)
 
     async def step_instruction(unit: str) -> None:
+        await waiting.out()
         await bench.step_instruction(unit)
 
     async def step_back(unit: str | None = None) -> None:
@@ -148,10 +155,14 @@ def _offer(bench: "Bench", live: Live) -> None:
         foreign = next((character for character in data if ord(character) > 0xFF), None)
         if foreign is not None:
             raise ValueError(f"{foreign!r} is no byte: write what cannot be typed as \\xHH")
-        await bench.send(line, data.encode("latin-1"))
+        await waiting.send(line, data.encode("latin-1"))
 
     async def type(unit: str, text: Text) -> None:
-        await bench.type(unit, text)
+        await waiting.type(unit, text)
+
+    async def withdraw(number: int | None = None) -> None:
+        """Take back what waits: one, or all of it."""
+        waiting.withdraw(number)
 
     async def start(unit: str) -> None:
         await bench.start(unit)
@@ -163,10 +174,24 @@ def _offer(bench: "Bench", live: Live) -> None:
         await bench.hold()
 
     async def go() -> None:
+        await waiting.out()
         await bench.go()
 
     async def step_event() -> None:
+        await waiting.out()
         await bench.step_event()
+
+    async def breaks(where: Text, kind: Text, given: dict[str, str | float] | None = None) -> int:
+        return await bench.breaks({"where": where, "kind": kind, **(given or {})})
+
+    async def take_branch(number: int) -> None:
+        await bench.take_branch(number)
+
+    async def compare_branch(number: int) -> list[str]:
+        return await bench.compare_branch(number)
+
+    async def mend(number: int | None = None) -> None:
+        await bench.mend(number)
 
     async def restart() -> None:
         await bench.restart()
@@ -175,5 +200,6 @@ def _offer(bench: "Bench", live: Live) -> None:
         await bench.revive()
 
     for deed in (pace, faster, slower, step_instruction, step_back, rewind, power, set_switch, set_pin, set_strap,
-                 place_switch, send, type, start, break_on_errors, hold, go, step_event, restart, revive):  # fmt: skip
+                 place_switch, send, type, withdraw, start, break_on_errors, hold, go, step_event, breaks, mend,
+                 take_branch, compare_branch,                 restart, revive):  # fmt: skip
         live.offer(deed.__name__, deed)

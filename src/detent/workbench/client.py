@@ -24,6 +24,7 @@ from detent.workbench import exports
 from detent.workbench.messages import (
     Answer,
     Ask,
+    EndpointPicture,
     Failed,
     Fault,
     Happened,
@@ -318,6 +319,15 @@ class Bench:
         """
         await self._ask("rewind", at)
 
+    async def take_branch(self, number: int) -> None:
+        """Hold, and let a future happen again that was left (`state.branches`); the one that is left for it is kept."""
+        await self._ask("take_branch", number)
+
+    async def compare_branch(self, number: int) -> list[str]:
+        """What is different in that future from what happened here, at the end of the shorter one, in words."""
+        words: list[str] = await self._ask("compare_branch", number)
+        return words
+
     async def run_to(self, unit: str, address: int) -> None:
         """Go on, and stop when the unit's program comes to `address`."""
         await self._ask("run_to_address", unit, address)
@@ -403,12 +413,23 @@ class Bench:
         image: bytes = await self._ask("read_back", unit, kept)
         return image
 
+    async def breaks(self, given: Mapping[str, object]) -> int:
+        """Something breaks: the arguments are those of the verb `fault` of the control API. Its number."""
+        number: int = await self._ask("breaks", dict(given))
+        return number
+
+    async def mend(self, number: int | None = None) -> None:
+        """A fault is mended; all of them without a number."""
+        await self._ask("mend", number)
+
     async def restart(self) -> None:
         """Begin anew from the cell file. Endpoints stay open if the lines are the same ones."""
         await self._ask("restart")
 
     async def revive(self) -> None:
         """After a crash: a new engine with the same cell file, and what was done up to the crash done again.
+
+        Its lines are served where they were: hosts find the same ports and links.
 
         It is held. If too much was done to be kept, it begins anew, and only programs that were loaded are loaded.
         """
@@ -417,7 +438,8 @@ class Bench:
         mirror, end = self._mirror, self.state.end
         deeds, until = (tuple(mirror.deeds), end) if mirror.complete else (tuple(mirror.loaded.values()), 0)
         self._asked.clear()
-        await self._start(self._order._replace(deeds=deeds, until=until, held=True))
+        placed = {name: tuple(map(_again, line.endpoints)) for name, line in self.picture.lines.items()}
+        await self._start(self._order._replace(deeds=deeds, until=until, held=True, placed=placed))
         self.crashed = None
         self._call_back()
 
@@ -473,3 +495,9 @@ class Bench:
     def program(self, unit: str) -> Program:
         """What an editor must know of the unit's language. KeyError for an unknown unit, ValueError for a part."""
         return Program(self.picture.units[unit].model)
+
+
+def _again(endpoint: EndpointPicture) -> Wanted:
+    """The same endpoint once more; a pseudo-terminal without a link has another name each time."""
+    bare = endpoint.kind == "pty" and endpoint.address.startswith("/dev/pts/")
+    return Wanted(endpoint.kind, "" if bare else endpoint.address)

@@ -70,7 +70,7 @@ class Editing:
                 }
                 for word in words(picture.model)
             ],
-            "source": source, "line": picture.line,
+            "file": picture.file, "source": source, "line": picture.line,
         }  # fmt: skip
 
     async def check(self, unit: Name, text: Text) -> dict[str, object]:

@@ -9,28 +9,33 @@ import pickle
 import socket
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import ClassVar
 
 from detent.assembler import ImageError
 from detent.cell.cell import Cell
-from detent.cell.deeds import Deed, Load, PlaceSwitch, Power, Release, Send, SetPin, SetSwitch, Start, Type
+from detent.cell.deeds import Break, Deed, Load, Mend, PlaceSwitch, Power, Release, Send, SetPin, SetSwitch, Start, Type
 from detent.cell.description import Description, Problem
 from detent.cell.history import Broken, History
 from detent.cell.recording import Entry
 from detent.cell.stores import Stores
 from detent.controllers import catalogue
-from detent.controllers.device import Powered, Refused, StoreImage
+from detent.controllers.device import Cautioned, Powered, Refused, StoreImage
 from detent.lines.line import Line
 from detent.outputs.units import views
 from detent.pins import Level
+from detent.realtime import breaking
+from detent.realtime.belonging import safe
 from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
-from detent.realtime.images import Images, ImagesUnusable
+from detent.realtime.images import Images, ImagesUnusable, cell_name
 from detent.realtime.loop import BEHIND, Loop, ServedLine, stopped_by_signals, wake_exactly
+from detent.realtime.names import Names
 from detent.realtime.pace import Lateness as Counted
 from detent.realtime.pace import Pace, WallNs
 from detent.realtime.service import build_with_images, models, open_endpoints
 from detent.realtime.target import Target, target
+from detent.realtime.verbs import VERBS
 from detent.ticks import SECOND, Ns
 from detent.uart import Chars
 from detent.workbench import look, rotors
@@ -72,7 +77,14 @@ class Engine:
             if self._images is not None:
                 opening.callback(self._images.close)
             cell = self._begin(found)
-            self._opened = open_endpoints(found.description, cell, order.wanted, opening)
+            self._opened = open_endpoints(
+                found.description,
+                cell,
+                order.wanted,
+                opening,
+                placed=order.placed,
+                link=self._link if order.state_dir is not None else None,
+            )
             self._pipe = Pipe(end, self._heed, self._tick, lambda: self._loop.stop())
             opening.callback(self._pipe.close)
             self._pace = Pace(order.pace or 1, origin=0)
@@ -97,6 +109,12 @@ class Engine:
         if folder is None:
             return None
         return Images.of(folder, self._order.target, models(description), is_file=bool(description.file))
+
+    def _link(self, line: str) -> Path:
+        """Where a host finds a line by the same name at each start: beside what is kept of the cell."""
+        folder, is_file = self._order.state_dir, bool(self._found.description.file)
+        assert folder is not None
+        return folder / "ports" / f"{cell_name(self._order.target, is_file=is_file)}-{safe(line)}"
 
     def _begin(self, found: Target) -> Cell:
         """A new cell, with nothing behind it."""
@@ -236,10 +254,13 @@ class Engine:
             units=look.units(history),
             switches=look.switches(history),
             motors=look.motors(history),
+            faults=look.faults(history),
+            branches=tuple((branch.number, branch.at, branch.end) for branch in history.branches),
             breakpoints={name: frozenset(addresses) for name, addresses in stops.items()},
             break_on_errors=history.break_on_errors,
             marks=(),
             formats={name: str(line.format) for name, line in self._named_lines()},
+            speaking={name: line.host_busy_until for name, line in self._named_lines()},
             dropped=sum(endpoint.dropped for _, endpoint in self._opened),
             faster=self._faster,
         )
@@ -252,6 +273,8 @@ class Engine:
         name = self.history.cell.wiring.names[unit]
         if isinstance(entry, Refused):
             self._marks.append(Mark(entry.at, "error", name, f"{entry.frame}: {entry.reason}"))
+        elif isinstance(entry, Cautioned):
+            self._marks.append(Mark(entry.at, "caution", name, f"{entry.frame}: {entry.what}"))
         elif isinstance(entry, Powered) and entry.at:
             self._marks.append(Mark(entry.at, "power", name, "on" if entry.on else "off"))
         elif isinstance(entry, StoreImage):
@@ -285,6 +308,19 @@ class Engine:
         self._stand()
         if not self.history.step():
             self.history.stopped = "nothing more happens by itself"
+
+    def take_branch(self, number: int) -> None:
+        """A future that was left happens again; the one that is left for it is kept."""
+        self._stand()
+        branch = self.history.leave_for(number)
+        self._tell()  # what is dropped is dropped before anything new is told
+        self.history.follow(branch)
+        self._stand()
+        self._pace.hold(self.now)
+
+    def compare_branch(self, number: int) -> list[str]:
+        """What is different at the end of that future from what is here at the same time, in words."""
+        return look.differences(*self.history.both(number))
 
     def step_instruction(self, unit: str) -> None:
         """The next instruction of a unit."""
@@ -389,6 +425,20 @@ class Engine:
         controller = self.history.cell.controller(unit)
         return controller.kept_memory() if kept else controller.program_memory()
 
+    def breaks(self, given: Mapping[str, object]) -> int:
+        """Something breaks, with the arguments of the verb `fault` of the control API; the number of the fault."""
+        found = VERBS["fault"].read(given)
+        lasting = found.get("for")
+        assert lasting is None or isinstance(lasting, int)
+        fault = breaking.meant(Names(self.history.cell), found)
+        self._do(Break(fault, lasting), "", f"{found['kind']} at {found['where']}")
+        return self.history.cell.faults.last
+
+    def mend(self, number: int | None) -> None:
+        """A fault is mended; all of them without a number."""
+        for one in list(self.history.cell.faults.standing) if number is None else [number]:
+            self._do(Mend(one), "", f"fault {one} mended")
+
     def restart(self) -> None:
         """Begin anew from the cell file. ValueError if its lines are others now."""
         lines, standing = self.history.cell.wiring.line_names, self._pace.held
@@ -421,7 +471,9 @@ class Engine:
     _VERBS: ClassVar[dict[str, Callable[..., object]]] = {
         verb.__name__: verb
         for verb in (hold, go, step_event, step_instruction, step_back, rewind, run_to_address, set_breakpoints,
+                     take_branch, compare_branch,
                      set_break_on_errors, power, set_switch, set_pin, place_switch, send_line, type, load, start, save,
+                     breaks, mend,
                      read_back, restart)
     } | {"pace": _set_pace}  # fmt: skip
 

@@ -1,13 +1,14 @@
 """A script for a line: command lines that are sent one after the other, with pauses in the time of the cell.
 
 One command a line, as it is typed; ``;`` begins a comment. ``@ 500 ms`` (or ``@ 0.5``, in seconds) is a pause, and
-``@ answer`` waits until somebody has answered on the line since the last command.
+``@ answer`` waits until somebody has answered on the line since the last command; ``@ again`` begins anew from the
+first line. A script waits while the cell stands, and stops where a unit refuses a command.
 """
 
 import asyncio
 from typing import TYPE_CHECKING, NamedTuple
 
-from detent.ticks import Ns, parse_duration
+from detent.ticks import MS, Ns, parse_duration
 from detent.workbench.live import Live, Value
 
 if TYPE_CHECKING:
@@ -29,6 +30,12 @@ class Answered(NamedTuple):
     line: int
 
 
+class Again(NamedTuple):
+    """Begin anew."""
+
+    line: int
+
+
 class Command(NamedTuple):
     """Send a command line."""
 
@@ -36,7 +43,9 @@ class Command(NamedTuple):
     text: str
 
 
-Step = Pause | Answered | Command
+Step = Pause | Answered | Again | Command
+
+SETTLED: Ns = 30 * MS  # behind the last character: by then a unit has turned down what it does not take
 
 
 def parse(text: str, comment: str = ";") -> list[Step]:
@@ -50,11 +59,15 @@ def parse(text: str, comment: str = ";") -> list[Step]:
             steps.append(Command(number, line))
         elif line[1:].strip().lower() == "answer":
             steps.append(Answered(number))
+        elif line[1:].strip().lower() == "again":
+            if not any(isinstance(step, (Pause, Answered)) for step in steps):
+                raise ValueError(f"line {number}: @ again needs a pause before it; write @ 500 ms, say")
+            steps.append(Again(number))
         else:
             try:
                 steps.append(Pause(number, parse_duration(line[1:].strip())))
             except ValueError:
-                what = f"line {number}: {line!r} is no pause; write @ 500 ms, @ 0.5 (seconds) or @ answer"
+                what = f"line {number}: {line!r} is no pause; write @ 500 ms, @ 0.5 (seconds), @ answer or @ again"
                 raise ValueError(what) from None
     if len(steps) > MOST_LINES:
         raise ValueError(f"{len(steps)} lines are too many; at most {MOST_LINES}")
@@ -68,9 +81,9 @@ class Errands:
         self._bench, self._live = bench, live
         self._running: dict[str, asyncio.Task[None]] = {}
 
-    def start(self, line: str, unit: str, text: str) -> None:
+    def start(self, line: str, unit: str, text: str, comment: str = ";") -> None:
         """Run the script `text` on a line, its commands to `unit`. Raises ValueError, KeyError."""
-        steps = parse(text)
+        steps = parse(text, comment)
         if not steps:
             raise ValueError("there is nothing to send; write one command a line")
         units = self._bench.picture.lines[line].units
@@ -87,22 +100,29 @@ class Errands:
             self._tell(line, {"running": False, "line": 0, "told": "stopped"})
 
     async def _run(self, line: str, unit: str, steps: list[Step]) -> None:
-        told = "done"
-        at = 0
+        told, at, place = "done", 0, 0
+        bench = self._bench
         try:
             heard = self._heard(line)
-            for step in steps:
-                at = step.line
-                self._tell(line, {"running": True, "line": at, "told": ""})
+            while place < len(steps):
+                step = steps[place]
+                at, place = step.line, place + 1
+                self._tell(line, {"running": True, "line": at, "told": "", "repeats": isinstance(steps[-1], Again)})
                 match step:
+                    case Again():
+                        place = 0
                     case Command():
-                        heard = self._heard(line)
-                        await self._bench.type(unit, step.text)
+                        heard, error = self._heard(line), bench.state.units[unit].error
+                        await bench.until(lambda state: not state.held)
+                        await bench.type(unit, step.text)
+                        await bench.until(lambda state: state.speaking[line] + SETTLED <= state.now)
+                        if (refused := bench.state.units[unit].error) is not None and refused != error:
+                            raise ValueError(f"{unit} refused {refused.frame or step.text}: {refused.reason}")
                     case Pause():
-                        until = self._bench.state.now + step.length
-                        await self._bench.until(lambda state, until=until: state.now >= until)  # type: ignore[misc]
+                        until = bench.state.now + step.length
+                        await bench.until(lambda state, until=until: state.now >= until)  # type: ignore[misc]
                     case Answered():
-                        await self._bench.until(lambda state, heard=heard: self._heard(line) > heard)  # type: ignore[misc]
+                        await bench.until(lambda state, heard=heard: self._heard(line) > heard)  # type: ignore[misc]
         except (ValueError, RuntimeError) as error:
             told = f"line {at}: {error}"
         self._running.pop(line, None)

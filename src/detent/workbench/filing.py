@@ -22,9 +22,22 @@ def offer(live: Live, folder: Folder, drafts: Drafts) -> None:
     async def read_file(name: Name) -> str:
         return folder.read_text(name)
 
-    async def write_file(name: Name, text: Text) -> str:
+    async def write_file(name: Name, text: Text, known: Text | None = None, over: bool = False) -> dict[str, str]:
+        """Write it, unless a file of that name says something else than `known`: then ask. `over`: write it."""
+        if (
+            not over
+            and (there := folder.told(name)) is not None
+            and there not in (text.encode(), (known or "").encode())
+        ):
+            own = known is not None
+            why = (
+                "has been changed by somebody else since it was opened"
+                if own
+                else "is there already, with another text"
+            )
+            return {"asks": f"{name} {why}: replace it?"}
         folder.write(name, text.encode())
-        return name
+        return {"saved": name}
 
     async def draft(name: Name) -> dict[str, str] | None:
         found = drafts.get(name)

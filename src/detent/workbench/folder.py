@@ -51,6 +51,11 @@ class Folder:
             raise ValueError(f"{name} has more than {LARGEST >> 20} MiB: that is no file for the workbench")
         return path.read_bytes()
 
+    def told(self, name: str) -> bytes | None:
+        """What is in a file, however long it is; None if there is none. Raises OutsideFolder, OSError."""
+        path = self.path(name)
+        return path.read_bytes() if path.is_file() else None
+
     def read_text(self, name: str) -> str:
         """The text of a file. Raises as `read`; ValueError if it is no text."""
         try:

@@ -1,9 +1,13 @@
 """Where the workbench listens, before anything heavy is loaded."""
 
 import contextlib
+import errno
 import ipaddress
 import socket
 from typing import NamedTuple
+
+USUAL = 8274  # the port without a word: a browser keeps what it remembers by address and port
+TRIED = 10  # ports from there on, before any that is free
 
 
 class Place(NamedTuple):
@@ -28,6 +32,17 @@ class Listening(NamedTuple):
             if ipaddress.ip_address(named).version == 6:
                 named = f"[{named}]"
         return f"http://{named}:{self.port}/" + (f"?token={token}" if token else "")
+
+
+def listen_as_usual(host: str, token: str | None) -> Listening:
+    """Listen on the usual port, or on the next one that is free. Raises OSError."""
+    for port in (*range(USUAL, USUAL + TRIED), 0):
+        try:
+            return listen(Place(host, port, token))
+        except OSError as error:
+            if port == 0 or error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                raise
+    raise AssertionError("the last port raises by itself")
 
 
 def listen(place: Place) -> Listening:

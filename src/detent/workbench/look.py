@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from detent.cell.build import Read
 from detent.cell.cell import Cell
 from detent.cell.description import Description
-from detent.cell.history import History
+from detent.cell.history import History, Moment
 from detent.cell.mechanics import Mechanics
 from detent.cell.panel import Front
 from detent.cell.parts import PARTS
@@ -15,8 +15,9 @@ from detent.controllers.catalogue import Model
 from detent.controllers.device import Controller
 from detent.lines.line import Line
 from detent.pins import Level, Pin
+from detent.realtime import breaking, verbs
 from detent.realtime.endpoints.endpoint import Endpoint
-from detent.ticks import Ns
+from detent.ticks import SECOND, Ns
 from detent.workbench import rotors
 from detent.workbench.messages import (
     AxisState,
@@ -90,6 +91,7 @@ def _unit(description: Description, cell: Cell, name: str) -> UnitPicture:
         language is not None,
         sum(len(area) for area in language.areas) if language is not None else 0,
         isinstance(found, Model) and bool(found.saves),
+        entry.program or entry.eeprom or "",
     )
 
 
@@ -195,6 +197,38 @@ def switches(history: History) -> dict[str, SwitchState]:
         elif isinstance(part, Switch):
             low, high = part.range if isinstance(part, AxisSwitch) else (None, None)
             found[cell.wiring.names[k]] = SwitchState(part.level, low, high)
+    return found
+
+
+def differences(there: Moment, here: Moment) -> list[str]:
+    """What two cells at one time do not have in common: states, positions, outputs."""
+    at, names, found = f"at {here.now / SECOND:.6f} s", here.cell.wiring.names, list[str]()
+    theirs = there.cell.controllers()
+    for name, controller in here.cell.controllers().items():
+        for axis in controller.axes:
+            one, other = theirs[name].status(there.now, axis), controller.status(here.now, axis)
+            place = f"{name}.{axis}" if axis else name
+            if one.position != other.position:
+                found.append(f"{at} {place} stands at {one.position} there, at {other.position} here")
+            if one.state != other.state:
+                found.append(f"{at} {place} is {one.state} there, {other.state} here")
+    for unit, (left, right) in enumerate(zip(there.panel.fronts, here.panel.fronts, strict=True)):
+        pins = [pin for pin, level in right.levels.items() if left.levels.get(pin) != level]
+        if pins:
+            found.append(f"{at} {names[unit]} has other levels at {', '.join(pins)}")
+    return found or [f"{at} nothing is different: states, positions and levels are the same"]
+
+
+def faults(history: History) -> dict[int, str]:
+    """The faults that stand, in words."""
+    cell, found = history.cell, {}
+    for number, fault in cell.faults.standing.items():
+        asked = breaking.told(cell, fault)
+        kind, where = str(asked.pop("kind")), asked.pop("where")
+        more = ", ".join(
+            f"{name} {value}" for name, value in asked.items() if value not in (None, 0, "both") or name == "level"
+        )
+        found[number] = f"{where}: {verbs.FAULTS[kind].help}" + (f" ({more})" if more else "")
     return found
 
 

@@ -58,6 +58,7 @@ class UnitPicture(NamedTuple):
     language: bool  # whether it holds programs
     capacity: int  # bytes of program memory; 0 without
     nonvolatile: bool  # whether it can keep a program without supply: `Bench.save`
+    file: str = ""  # its program, as the cell file names it
 
 
 class SwitchPicture(NamedTuple):
@@ -188,7 +189,7 @@ class Mark(NamedTuple):
     """A mark on the time line."""
 
     at: Ns
-    kind: str  # error, power, deed, breakpoint, stored
+    kind: str  # error, caution, power, deed, breakpoint, stored
     unit: str  # "" where it is the whole cell's
     text: str
 
@@ -214,10 +215,13 @@ class State(NamedTuple):
     units: Mapping[str, UnitState]
     switches: Mapping[str, SwitchState]
     motors: Mapping[str, MotorState]
+    faults: Mapping[int, str]  # that stand, by number, in words
+    branches: tuple[tuple[int, Ns, Ns], ...]  # futures that were left: number, where, and how far they had come
     breakpoints: Mapping[str, frozenset[int]]
     break_on_errors: bool
     marks: tuple[Mark, ...]  # in order of time, the last `MOST_MARKS`
     formats: Mapping[str, str]  # how characters look on each line, like 9600 7O2
+    speaking: Mapping[str, Ns]  # when the host of each line has said everything that it was given
     dropped: int  # bytes that hosts did not read
     faster: float  # cell time per wall time, measured over the last second
 
@@ -245,6 +249,7 @@ class Order(NamedTuple):
     held: bool
     deeds: tuple[Action, ...] = ()  # to be done first, each at its time: those of an engine that is gone
     until: Ns = 0  # as far as it had come
+    placed: Mapping[str, tuple[Wanted, ...]] = {}  # where its lines were served, by name
 
 
 class Ask(NamedTuple):

@@ -72,6 +72,9 @@ def _top(title: str, pages: Sequence[Page]) -> str:
       data-help="A short guided tour ( ? )">{icon("tour")}</button>
   </span>
 </header>
+<dialog class="panel futures" data-part="futures" aria-label="Other futures"><h2>Other futures</h2>
+<p class="quiet">The cell went on from its past, and something else happened. What had happened before is kept.</p>
+<ul></ul><div class="row"><span class="grow"></span><button class="key" data-close>Close</button></div></dialog>
 <div class="alarm" role="alert" data-part="alarm"><span data-live="crashed"></span>
   <button class="key small primary" data-do="revive">Start the cell again</button></div>
 <div class="alarm link" role="alert">No connection to the workbench. Trying again …</div>"""
@@ -93,6 +96,11 @@ def _bottom() -> str:
       data-help="Slower ( [ )">{icon("slower")}</button><select class="field" data-part="pace" aria-label="Pace"
       data-help="How fast the cell runs: times real time">{paces}</select><button class="key" data-do="faster"
       aria-label="Faster" data-help="Faster ( ] )">{icon("faster")}</button></span>
+    <span class="notices"><button class="waiting" data-part="broken" hidden></button>
+    <a class="waiting" href="/terminal" data-part="waiting" hidden
+      data-help="Commands that wait until time goes on: see them, or take them back, on the page Terminal"></a>
+    <button class="waiting calm" data-part="branches" hidden
+      data-help="The cell went on from its past: what came after is kept. Compare it, or take it again"></button></span>
     <span class="why" data-live="why" data-level="past" aria-live="polite"></span>
     <span class="pulse" data-help="How late events of the cell are served, 99 of 100 at most; how fast it really runs">
       <span class="dropped" data-level="dropped"><b data-live="dropped"></b> bytes lost</span>

@@ -30,10 +30,10 @@ def test_it_opens_on_the_drilling_cell_running(window: Window) -> None:
 
 def test_the_power_switch_of_a_unit_switches_it_off_and_on(window: Window) -> None:
     power = window.page.get_by_role("switch", name="Power of bar")
-    assert power.get_attribute("aria-pressed") == "true"
+    assert power.get_attribute("aria-checked") == "true"
     power.click()
     window.until("() => detent.get('u.bar.powered') === false")
-    assert power.get_attribute("aria-pressed") == "false"
+    assert power.get_attribute("aria-checked") == "false"
     window.until("() => detent.get('marks').some(([at, kind, unit]) => kind === 'power' && unit === 'bar')")
     power.click()
     window.until("() => detent.get('u.bar.powered') === true && detent.get('u.bar.state') === 'ready'")
@@ -176,7 +176,9 @@ def test_a_command_from_the_panel_is_answered_and_an_error_is_shown(window: Wind
 
 def test_a_host_program_is_served_at_the_address_that_the_panel_shows(window: Window, workbench: Served) -> None:
     address = next(end["address"] for end in workbench.endpoints if end["unit"] == "drill")
-    assert window.page.locator("[data-unit=drill] .endpoint").inner_text() == address
+    shown = window.page.locator("[data-unit=drill] .endpoint")
+    assert shown.get_attribute("data-copy") == address  # a long one is shown by its end
+    assert shown.inner_text().removeprefix("…/") in address
     client = os.open(address, os.O_RDWR | os.O_NOCTTY)
     try:
         os.write(client, b"F\x76\r")  # F and its checksum
@@ -198,3 +200,60 @@ def test_everything_that_can_be_clicked_has_a_name(window: Window) -> None:
             .map((one) => one.outerHTML.slice(0, 120))"""
     )
     assert nameless == []
+
+
+def test_something_breaks_stands_in_sight_and_is_mended_with_one_click(window: Window) -> None:
+    window.call("mend")
+    box = window.page.get_by_role("region", name="Break it")
+    box.get_by_label("What breaks").select_option("stuck")
+    box.get_by_label("Where").select_option("stop")
+    box.get_by_role("button", name="Break").click()
+    window.until("() => detent.get('u.bar.pin.UI3') === 0")  # its own lever is at 1 still
+    assert window.get("s.stop.level") == 1
+    window.page.get_by_role("button", name="1 fault: mend").wait_for()  # on every page
+    box.get_by_role("button", name="Mend stop: a contact or an input stays at a level (level 0)").click()
+    window.until("() => detent.get('u.bar.pin.UI3') === 1 && !detent.get('faults').length")
+
+
+def test_a_fault_that_cannot_be_says_why_and_breaks_nothing(window: Window) -> None:
+    box = window.page.get_by_role("region", name="Break it")
+    box.get_by_label("What breaks").select_option("lost")
+    box.get_by_label("rate").fill("7")
+    box.get_by_role("button", name="Break").click()
+    window.page.locator(".toast.error").first.wait_for()
+    assert window.get("faults") == []
+    window.page.evaluate("document.getElementById('toasts').replaceChildren()")
+
+
+def test_what_is_sent_while_the_cell_stands_waits_in_sight_and_is_sent_when_it_goes_on(window: Window) -> None:
+    window.call("hold")
+    window.until("() => detent.get('held')")
+    for text in ("V1", "V2"):
+        field = window.page.get_by_label("Command to bar")
+        field.fill(text)
+        field.press(ENTER)
+    window.page.get_by_text("2 commands wait").wait_for()
+    window.call("withdraw", window.get("queue")[0][0])
+    window.page.get_by_text("1 command waits").wait_for()
+    stood = window.get("now")
+    window.call("go")
+    window.until("(stood) => !detent.get('queue').length && detent.get('now') > stood", stood)
+
+
+def test_a_future_that_was_left_is_compared_and_taken_again(window: Window) -> None:
+    window.until("() => detent.get('now') > 1e9")
+    window.call("hold")
+    window.until("() => detent.get('held')")
+    end = window.get("now")
+    at(window, 500_000_000)
+    window.call("set_switch", "start", 0)
+    window.call("go")
+    window.until("(end) => detent.get('now') > end", end)
+    window.call("hold")
+    window.page.get_by_role("button", name="1 other future").click()
+    futures = window.page.get_by_role("dialog", name="Other futures")
+    futures.get_by_role("button", name="Compare").click()
+    futures.get_by_text("has other levels at").first.wait_for()
+    futures.get_by_role("button", name="Take it again").click()
+    window.until("(end) => detent.get('held') && detent.get('now') === end && detent.get('s.start.level') === 1", end)
+    window.page.get_by_role("button", name="1 other future").wait_for()  # the one that was left for it

@@ -156,7 +156,7 @@ def test_two_cursors_show_times_and_values_with_their_differences(scope: Window)
     strip = scope.page.locator(".scope-strip").inner_text()
     assert "\u0394t" in strip
     assert "Hz" in strip
-    scope.page.get_by_role("button", name="Show everything since the beginning").click()
+    scope.page.get_by_role("button", name="All: everything since the beginning").click()
     scope.until(f"() => {SCOPE}.view.begin < {SCOPE}.cursors[0]")
     scope.picture("scope-cursors")
     before = value(scope, "cursors[1]")

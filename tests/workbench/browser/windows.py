@@ -33,7 +33,7 @@ def served(place: Path, *arguments: str) -> Iterator[Served]:
     """`detent workbench ARGUMENTS`, its files below `place`."""
     folder, state = place / "chosen", place / "state"
     folder.mkdir(exist_ok=True)
-    command = [*COMMAND, *arguments, "--json", "--folder", str(folder), "--state", str(state)]
+    command = [*COMMAND, *arguments, "--port", "0", "--json", "--folder", str(folder), "--state", str(state)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=place)
     try:
         assert process.stdout is not None

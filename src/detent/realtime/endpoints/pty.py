@@ -196,6 +196,8 @@ def _point(link: Path, device: str) -> None:
         raise EndpointError(f"{link}: {error.strerror}; choose another LINK for --pty") from error
     if present is not None and not stat.S_ISLNK(present.st_mode):
         raise EndpointError(f"{link} exists and is not a symbolic link; remove it or choose another LINK for --pty")
+    if present is not None and str(link.readlink()) == device:
+        return  # left behind by one that ended badly, and its terminal is ours now
     if present is not None and _served(link):
         raise EndpointError(f"{link} is in use: another detent serves there; stop it, or choose another LINK for --pty")
     try:

@@ -78,7 +78,7 @@ part("slide", (box) => {
     pen.fillStyle = css.getPropertyValue("--line");
     pen.fillRect(AIR, 16, width(), 3);
     const every = pitch(high - low, Math.max(2, wide / 64));
-    pen.font = `10px ${css.getPropertyValue("--mono")}`;
+    pen.font = `11px ${css.getPropertyValue("--mono")}`;
     pen.textAlign = "center";
     pen.textBaseline = "top";
     for (let tick = Math.ceil(low / every - 1e-9) * every; tick <= high + every * 1e-9; tick += every) {

@@ -6,6 +6,8 @@ import { makeEditor } from "./program_editor.js";
 const CHECK_AFTER = 180,
   KEEP_AFTER = 400; // ms behind the last change
 
+const KEYS = { F9: "break", F10: "step", "Shift-F10": "back", F4: "cursor" }; // F8 is everywhere: workbench.js
+
 class Program {
   constructor(root) {
     this.root = root;
@@ -39,6 +41,7 @@ class Program {
       changed: (typed) => this.changed(typed),
       breakpoints: (lines) => this.setBreakpoints(lines),
       moved: () => {},
+      placed: (line) => this.placed(line),
       keys: {
         "Mod-s": () => this.deeds.save(),
         "Mod-Enter": () => (this.facts.language ? this.deeds.run() : this.deeds.send()),
@@ -51,8 +54,23 @@ class Program {
     });
     const units = [...this.root.querySelectorAll("[data-unit]")].map((tab) => tab.dataset.unit);
     const last = detent.remembered("program.unit");
-    this.ends.push(detent.frame(() => this.look()));
+    this.ends.push(detent.frame(() => this.look()), this.listenForKeys());
     if (units.length) await this.show(units.includes(last) ? last : units[0]);
+  }
+
+  /* The keys of the page, wherever the focus is; in the editor they are its own. */
+  listenForKeys() {
+    const pressed = (event) => {
+      if (event.defaultPrevented || event.altKey || !this.facts || this.at.dialog.open) return;
+      if (event.target.closest && event.target.closest("[role=dialog]")) return;
+      const control = event.ctrlKey || event.metaKey;
+      const name = control && event.key.toLowerCase() === "s" ? "save" : control ? null : KEYS[(event.shiftKey ? "Shift-" : "") + event.key];
+      if (!name) return;
+      event.preventDefault();
+      if (!event.repeat || name === "step" || name === "back") this.deeds[name]();
+    };
+    document.addEventListener("keydown", pressed);
+    return () => document.removeEventListener("keydown", pressed);
   }
 
   close() {
@@ -103,6 +121,7 @@ class Program {
     clearTimeout(this.checkSoon);
     this.checkSoon = setTimeout(() => this.check(), CHECK_AFTER);
     if (!typed) return;
+    if (this.told === "bad") this.say(""); // of the text as it was
     clearTimeout(this.keepSoon);
     this.keepSoon = setTimeout(() => this.flush(), KEEP_AFTER);
     this.unkept = this.facts.draft;
@@ -261,16 +280,18 @@ class Program {
     );
   }
 
+  /* The line of the instruction at this line, or of the next one behind it. */
+  placed(line) {
+    return this.addresses && [...this.addresses.keys()].sort((a, b) => a - b).find((place) => place >= line);
+  }
+
   /* Somebody has set or removed a breakpoint: those on no instruction go to the next one. */
   setBreakpoints(lines) {
     if (!this.checked || !this.facts.language) {
       this.editor.breakAt([]);
       return;
     }
-    const places = [...this.addresses.keys()].sort((a, b) => a - b);
-    const moved = [...new Set(lines.map((line) => places.find((place) => place >= line)).filter(Boolean))].sort(
-      (a, b) => a - b,
-    );
+    const moved = [...new Set(lines.map((line) => this.placed(line)).filter(Boolean))].sort((a, b) => a - b);
     this.editor.breakAt(moved);
     this.ahead = !this.checked.loaded; // set in a text that is not loaded yet
     if (this.ahead) this.say("Breakpoints are in force once this text is loaded.");
@@ -314,13 +335,14 @@ class Program {
         if (text !== undefined) this.replace(text, this.file);
       },
       revert: async () => {
+        const changed = editor.text !== facts.source;
         this.unkept = null;
         if ((await this.ask("forget_draft", facts.draft)) === undefined) return;
         this.file = "";
         this.saved = facts.source;
         editor.set(facts.source);
         this.name();
-        this.say("The draft is gone.");
+        this.say(changed ? "As it was. Ctrl-Z in the text brings back what you had written." : "Nothing was changed.");
       },
       open: () =>
         this.chooseFile("Open", "Open", async (name) => {
@@ -332,16 +354,17 @@ class Program {
           return true;
         }),
       save: () =>
-        this.chooseFile("Save in the chosen folder", "Save", async (name) => {
+        this.chooseFile("Save in the chosen folder", "Save", async (name, over) => {
           const text = editor.text,
-            where = await this.ask("write_file", name, text);
-          if (where === undefined) return false;
+            told = await this.ask("write_file", name, text, name === this.file ? this.saved : null, over);
+          if (told === undefined) return false;
+          if (told.asks) return told.asks;
           this.file = name;
           this.saved = text;
           this.unkept = facts.draft;
           this.flush();
           this.name();
-          detent.toast(`Saved: ${where}`);
+          detent.toast(`Saved: ${told.saved}`);
           return true;
         }),
       go: () => this.ask(detent.get("held") ? "go" : "hold"),
@@ -380,7 +403,17 @@ class Program {
       { name } = form.elements;
     dialog.querySelector("h2").textContent = title;
     dialog.querySelector("[type=submit]").textContent = word;
-    name.value = this.file || (word === "Save" ? `${this.facts.unit}.txt` : "");
+    name.value = this.file || (word === "Save" ? this.facts.file || `${this.facts.unit}.txt` : "");
+    const submit = dialog.querySelector("[type=submit]"),
+      asks = dialog.querySelector(".program-asks");
+    let over = "";
+    const settle = () => {
+      over = "";
+      asks.textContent = "";
+      submit.textContent = word;
+    };
+    settle();
+    name.oninput = settle;
     list.replaceChildren(
       ...names.map((file) => {
         const item = document.createElement("li"),
@@ -390,6 +423,7 @@ class Program {
         button.textContent = file;
         button.addEventListener("click", () => {
           name.value = file;
+          settle();
         });
         button.addEventListener("dblclick", () => form.requestSubmit());
         item.append(button);
@@ -398,7 +432,14 @@ class Program {
     );
     form.onsubmit = async (event) => {
       event.preventDefault();
-      if (name.value && (await deed(name.value))) dialog.close();
+      if (!name.value) return;
+      const done = await deed(name.value, over === name.value);
+      if (typeof done === "string") {
+        over = name.value;
+        asks.textContent = done;
+        submit.textContent = "Replace";
+        submit.focus();
+      } else if (done) dialog.close();
     };
     dialog.showModal();
     name.focus();
@@ -406,6 +447,7 @@ class Program {
   }
 
   say(text, kind = "") {
+    this.told = kind;
     for (const told of this.root.querySelectorAll(".program-told")) {
       told.textContent = text;
       told.dataset.kind = kind;

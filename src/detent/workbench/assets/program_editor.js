@@ -16,7 +16,7 @@ class Editor {
     this.labels = {};
     this.addresses = ranges();
     this.breakpoints = ranges();
-    this.errors = ranges();
+    this.errors = ranges(true);
     this.spots = ranges(); // the running line, lines that differ
     this.quiet = false; // a change that is ours and no typing
     this.view = new CM.EditorView({ parent: place, doc: "", extensions: this.extensions() });
@@ -137,7 +137,8 @@ class Editor {
     const toggle = (view, line) => {
       const at = view.state.doc.lineAt(line.from).number,
         lines = this.breakLines;
-      const next = lines.includes(at) ? lines.filter((other) => other !== at) : [...lines, at];
+      const place = this.told.placed(at); // a line without an instruction stands for the next one
+      const next = lines.includes(place) ? lines.filter((other) => other !== place) : lines.includes(at) ? lines.filter((other) => other !== at) : [...lines, at];
       this.breakAt(next);
       this.told.breakpoints(next);
       return true;
@@ -181,6 +182,7 @@ class Editor {
       CM.hoverTooltip((view, at) => this.help(view, at), { hoverTime: 250 }),
       this.language.of([]),
       changes,
+      CM.EditorView.contentAttributes.of({ tabindex: "0" }),
       CM.EditorView.theme({ "&": { height: "100%" }, ".cm-scroller": { overflow: "auto" } }),
     ];
   }
@@ -291,7 +293,7 @@ class Editor {
         .map((row) => ({
           label: word.spelling,
           type: "keyword",
-          detail: row.takes === "none" || row.takes === "no argument" ? "" : row.takes,
+          detail: row.what,
           info: () => sheet(word.rows, language),
           boost: word.spelling === typed ? 2 : 0,
         })),
@@ -348,13 +350,24 @@ function paragraph(text, kind) {
   return made;
 }
 
-/* A set of ranges that move with the text: {field, set}. */
-function ranges() {
+/* Whether the line of a range was changed. */
+function touched(transaction, from, to) {
+  const { doc } = transaction.state;
+  let found = false;
+  transaction.changes.iterChangedRanges((a, b, begin, end) => {
+    found ||= doc.lineAt(begin).from <= to && from <= doc.lineAt(end).to;
+  });
+  return found;
+}
+
+/* A set of ranges that move with the text: {field, set}. Those that fade are gone when their line is changed. */
+function ranges(fades = false) {
   const set = CM.StateEffect.define();
   const field = CM.StateField.define({
     create: () => CM.RangeSet.empty,
     update(value, transaction) {
       value = value.map(transaction.changes);
+      if (fades && transaction.docChanged) value = value.update({ filter: (from, to) => !touched(transaction, from, to) });
       for (const effect of transaction.effects) if (effect.is(set)) value = CM.RangeSet.of(effect.value, true);
       return value;
     },

@@ -44,7 +44,7 @@ export class Tools {
         this.followKey,
         key("\u2212", "Show more time", () => scope.hands.zoom(1.6)),
         key("+", "Show less time", () => scope.hands.zoom(1 / 1.6)),
-        key("All", "Show everything since the beginning", () => scope.fit()),
+        key("All", "All: everything since the beginning", () => scope.fit()),
         this.cursorKey,
         this.span,
       ),

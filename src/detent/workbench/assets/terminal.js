@@ -34,6 +34,7 @@ part("terminal", (box) => {
   let unkept = null; // a draft that is kept soon
   let said = [];
   let back = 0;
+  let over = ""; // a file that is to be replaced
 
   // -- what was said --
 
@@ -46,7 +47,7 @@ part("terminal", (box) => {
     when.textContent = seconds(one.begin);
     const who = document.createElement("span");
     who.className = "who";
-    who.textContent = one.sender ? `\u2190 ${one.sender}` : "\u2192 host";
+    who.textContent = `${one.sender || "host"}:`; // who says it: an arrow was read either way
     const what = document.createElement("span");
     what.className = "what";
     for (const [kind, shown, meaning, hex] of one.parts) {
@@ -136,7 +137,32 @@ part("terminal", (box) => {
     hint();
     showScript();
     progress();
+    queue();
     look();
+  }
+
+  // -- what waits while the cell stands --
+
+  function queue() {
+    const mine = (get("queue") || []).filter((one) => one[1] === line);
+    const shelf = role("waits");
+    shelf.hidden = !mine.length;
+    shelf.replaceChildren(...mine.map(([number, , unit, written]) => {
+      const row = document.createElement("div");
+      const who = document.createElement("span");
+      who.className = "quiet";
+      who.textContent = unit ? `waits, to ${unit}:` : "waits, bytes:";
+      const what = document.createElement("b");
+      what.className = "mono grow";
+      what.textContent = written.replace(/[^ -~]/g, (one) => `\\x${one.charCodeAt(0).toString(16).padStart(2, "0")}`);
+      const away = document.createElement("button");
+      away.className = "key small";
+      away.textContent = "Take back";
+      away.setAttribute("aria-label", `Take back ${written}`);
+      away.addEventListener("click", () => call("withdraw", number).catch((error) => toast(error.message, "error")));
+      row.append(who, what, away);
+      return row;
+    }));
   }
 
   // -- a line to send --
@@ -156,7 +182,7 @@ part("terminal", (box) => {
     const written = text.value.trim();
     const found = (facts[line].words[to.value] || []).find(([spelling]) => written.startsWith(spelling));
     if (!found) {
-      here.textContent = written ? "" : "Address, checksum and the end of the frame are added.";
+      here.textContent = written ? "" : facts[line].added;
       return;
     }
     const [, ...rows] = found;
@@ -179,8 +205,10 @@ part("terminal", (box) => {
     fillSaid();
     text.value = "";
     hint();
+    const every = role("every").value;
     try {
-      if (to.value === RAW) await call("send", line, bytes(written));
+      if (every && to.value !== RAW) await call("run_script", line, to.value, `${written}\n@ ${Number(every)}\n@ again`, "");
+      else if (to.value === RAW) await call("send", line, bytes(written));
       else await call("type", to.value, written);
       toEnd();
       look();
@@ -244,6 +272,7 @@ part("terminal", (box) => {
 
   function progress() {
     const how = get(`script.${line}`) || { running: false, line: 0, told: "" };
+    role("repeats").hidden = !(how.running && how.repeats);
     role("run").disabled = how.running || facts[line].host !== null;
     role("stop").disabled = !how.running;
     const told = role("told");
@@ -266,6 +295,7 @@ part("terminal", (box) => {
       role("told").classList.add("bad");
     }
   });
+  role("repeats").addEventListener("click", () => call("stop_script", line).catch((error) => toast(error.message, "error")));
   role("stop").addEventListener("click", () => call("stop_script", line).catch((error) => toast(error.message, "error")));
   role("file").addEventListener("focus", async () => {
     const files = await call("files", [".txt", ".script"]).catch(() => []);
@@ -282,11 +312,20 @@ part("terminal", (box) => {
   });
   role("save").addEventListener("click", async () => {
     try {
-      toast(`Saved: ${await call("write_file", role("file").value, script.value)}`);
-      keep();
+      const name = role("file").value;
+      const told = await call("write_file", name, script.value, null, over === name);
+      over = told.asks ? name : "";
+      role("save").textContent = over ? "Replace" : "Save";
+      toast(told.asks || `Saved: ${told.saved}`, told.asks ? "error" : "note");
+      if (told.saved) keep();
     } catch (error) {
       toast(error.message, "error");
     }
+  });
+
+  role("file").addEventListener("input", () => {
+    over = "";
+    role("save").textContent = "Save";
   });
 
   role("hex").addEventListener("click", () => {
@@ -298,7 +337,7 @@ part("terminal", (box) => {
   rows.addEventListener("scroll", () => talk.classList.toggle("away", !atEnd()));
   for (const tab of box.querySelectorAll("[data-line]")) tab.addEventListener("click", () => choose(tab.dataset.line));
 
-  const ends = [frame(soon), on("script.", progress)];
+  const ends = [frame(soon), on("script.", progress), on("queue", queue)];
   choose(line);
   return () => {
     ends.forEach((end) => end());

@@ -2,7 +2,7 @@
 
 const { part, on, frame, call, toast, seconds, get } = window.detent;
 
-const COLOURS = { error: "#ff6b5e", power: "#ffb02e", deed: "#7fe3d0", breakpoint: "#ff8ad0", stored: "#8fb8ff" };
+const COLOURS = { error: "#ff6b5e", caution: "#ffd84d", power: "#ffb02e", deed: "#7fe3d0", breakpoint: "#ff8ad0", stored: "#8fb8ff" };
 const LEFT = 10; // px of air at both ends
 const NICE = [1, 2, 5];
 
@@ -62,7 +62,7 @@ part("timeline", (box) => {
     pen.fillRect(x(now), rail - 3, Math.max(0, x(end()) - x(now)), 6);
 
     const digits = Math.max(0, Math.min(9, 9 - Math.floor(Math.log10(every))));
-    pen.font = '10.5px ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace';
+    pen.font = '11px ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace';
     pen.textBaseline = "top";
     pen.fillStyle = "#a9b0b3";
     pen.strokeStyle = "#4b565a";
@@ -84,7 +84,7 @@ part("timeline", (box) => {
       if (px < 0 || px > wide || last[kind] === px) continue;
       last[kind] = px;
       pen.fillStyle = COLOURS[kind] || "#c3c9cc";
-      if (kind === "error" || kind === "breakpoint") {
+      if (kind === "error" || kind === "breakpoint" || kind === "caution") {
         pen.beginPath();
         pen.moveTo(px, 5);
         pen.lineTo(px + 4, 11);
@@ -208,6 +208,49 @@ part("timeline", (box) => {
     for (const end of ends) end();
     resized.disconnect();
   };
+});
+
+part("waiting", (chip) => on("queue", (key, value) => {
+  const count = (value || []).length;
+  chip.hidden = !count;
+  chip.textContent = count === 1 ? "1 command waits" : `${count} commands wait`;
+}));
+
+part("branches", (chip) => {
+  chip.addEventListener("click", () => document.querySelector("dialog.futures").showModal());
+  return on("branches", (key, value) => {
+    const count = (value || []).length;
+    chip.hidden = !count;
+    chip.textContent = count === 1 ? "1 other future" : `${count} other futures`;
+  });
+});
+
+part("futures", (dialog) => {
+  dialog.querySelector("[data-close]").addEventListener("click", () => dialog.close());
+  return on("branches", (key, value) => {
+    dialog.querySelector("ul").replaceChildren(...(value || []).map(([number, at, end]) => {
+      const item = document.createElement("li");
+      const what = document.createElement("span");
+      what.textContent = `left at ${seconds(at)} s, had come to ${seconds(end)} s`;
+      const told = document.createElement("pre");
+      const compare = document.createElement("button");
+      const take = document.createElement("button");
+      compare.className = "key small";
+      compare.textContent = "Compare";
+      take.className = "key small primary";
+      take.textContent = "Take it again";
+      compare.addEventListener("click", async () => {
+        const found = await call("compare_branch", number).catch((error) => [error.message]);
+        told.textContent = found.join("\n");
+      });
+      take.addEventListener("click", () => {
+        dialog.close();
+        call("take_branch", number).catch((error) => toast(error.message, "error"));
+      });
+      item.append(what, compare, take, told);
+      return item;
+    }));
+  });
 });
 
 part("go", (button) => {

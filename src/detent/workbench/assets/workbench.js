@@ -107,7 +107,7 @@ function show(element, kind, value) {
       element.style.setProperty("--value", value === null ? 0 : value);
       break;
     case "pressed":
-      element.setAttribute("aria-pressed", value ? "true" : "false");
+      element.setAttribute(element.getAttribute("role") === "switch" ? "aria-checked" : "aria-pressed", value ? "true" : "false");
       break;
   }
 }
@@ -296,6 +296,11 @@ function listenForDeeds() {
   document.addEventListener("click", (event) => {
     // a pointer does not leave the focus at a button or tab, where the next space would press it once more
     if (event.detail > 0) event.target.closest("button, a")?.blur();
+  });
+  document.addEventListener("keydown", (event) => {
+    if (event.key !== "F8" || event.defaultPrevented || event.ctrlKey || event.altKey || event.shiftKey) return;
+    event.preventDefault(); // wherever the focus is
+    if (!event.repeat) deed(values.get("held") ? "go" : "hold");
   });
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;

@@ -11,7 +11,7 @@ itself to keys, and nothing has to be registered or let go:
 - ``data-live="KEY"``: the text of the element is the value; ``data-form="time|steps|rate|level|..."`` says how
 - ``data-level="KEY"``: its attribute ``data-value`` is the value, for style sheets
 - ``data-var="KEY"``: its custom property ``--value`` is the value, for transforms
-- ``data-pressed="KEY"``: ``aria-pressed`` says whether the value is true
+- ``data-pressed="KEY"``: ``aria-pressed`` (of a switch ``aria-checked``) says whether the value is true
 - ``data-help="TEXT"``: help when one hovers, focuses or holds it
 - ``data-do="CALL" data-args='["bar", "!u.bar.powered"]'``: a click makes the call; ``"!KEY"`` stands for the
   opposite of what KEY is, ``"=KEY"`` for what it is

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
+from detent.realtime.verbs import FAULTS, VERBS
 from detent.workbench.icons import icon
 from detent.workbench.messages import LinePicture, MotorPicture, Picture, PinPicture, SwitchPicture, UnitPicture
 from detent.workbench.pages import Page, Window
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from detent.workbench.client import Bench
 
 TURN = 200  # steps of a turn of the dial where no motor is fitted that would say
+
+LONGEST_ADDRESS = 28  # characters that fit a panel
 
 DRIVES = ("output", "open collector", "winding")
 
@@ -50,13 +53,40 @@ def markup(picture: Picture) -> str:
         f'<div class="cell{" with-panel" if panel else ""}" data-part="wires" data-wires="{escape(wires)}">'
         f'<svg class="wires" aria-hidden="true"></svg>{_panel(panel) if panel else ""}'
         f'<div class="units" style="--count:{max(1, len(picture.units) + len(loose))}">{cards}</div></div>'
+        f"{_breaking(picture)}"
     )
+
+
+def _breaking(picture: Picture) -> str:
+    """What can break, and what is broken: the faults of the control API."""
+    places = {
+        "line": [line.name for line in picture.lines.values()],
+        "unit": list(picture.units),
+        "switch or UNIT.PIN": [
+            *picture.switches,
+            *(f"{unit.name}.{pin.name}" for unit in picture.units.values() for pin in unit.pins if pin.kind == "input"),
+        ],
+    }
+    kinds = [[kind.name, kind.help, kind.takes, places[kind.where]] for kind in FAULTS.values()]
+    helps = {parameter.name: parameter.help for parameter in VERBS["fault"].parameters}
+    options = "".join(f'<option value="{escape(kind.name)}">{escape(kind.help)}</option>' for kind in FAULTS.values())
+    return f"""<section class="panel breaking" aria-label="Break it" data-part="breaking"
+ data-kinds="{escape(json.dumps(kinds))}" data-helps="{escape(json.dumps(helps))}">
+<div class="panel-head"><h2>Break it</h2><span class="quiet grow">What a real cell does some day: every fault can be
+mended, and taken back on the time line.</span></div>
+<form class="row"><select class="field" name="kind" aria-label="What breaks">{options}</select>
+<select class="field" name="where" aria-label="Where"></select><span class="row more"></span>
+<label class="quiet">for <input class="field num" name="for" placeholder="until mended" aria-label="For how long"
+ data-help="A time like 200 ms, or seconds; empty: until it is mended"></label>
+<button class="key primary">Break</button></form>
+<ul class="standing" aria-label="Faults that stand"></ul></section>"""
 
 
 def _panel(switches: Iterable[SwitchPicture]) -> str:
     """The switches that a hand sets."""
     rows = "".join(
-        f"""<button class="toggle" role="switch" data-do="set_switch" data-args="{_args(s.name, f"!s.{s.name}.level")}"
+        f"""<button class="toggle" role="switch" aria-checked="false" data-do="set_switch"
+ data-args="{_args(s.name, f"!s.{s.name}.level")}"
  data-pressed="s.{escape(s.name)}.level" data-jack="{escape(s.name)}" data-side="right"
  data-help="Switch {escape(s.name)}: drives {escape(", ".join(s.drives))}">
 <span class="name">{escape(s.name)}</span><i class="lever" aria-hidden="true"></i>
@@ -72,7 +102,7 @@ def _unit(picture: Picture, unit: UnitPicture, jacks: set[str]) -> str:
     name, key = escape(unit.name), escape(f"u.{unit.name}")
     line = picture.lines.get(unit.line) if unit.line is not None else None
     axes = "".join(_axis(picture, unit, axis, jacks) for axis in unit.axes)
-    power = f"""<button class="power" role="switch" data-do="power" data-pressed="{key}.powered"
+    power = f"""<button class="power" role="switch" aria-checked="false" data-do="power" data-pressed="{key}.powered"
  data-args="{_args(unit.name, f"!u.{unit.name}.powered")}" aria-label="Power of {name}"
  data-help="Power of {name}">{icon("power")}</button>"""
     if not unit.axes:
@@ -216,7 +246,7 @@ def _pin(unit: UnitPicture, pin: PinPicture, side: str, wired: bool) -> str:
 def _straps(unit: UnitPicture) -> str:
     """The straps as a block of small switches."""
     keys = "".join(
-        f"""<button class="strap" role="switch" data-do="set_strap"
+        f"""<button class="strap" role="switch" aria-checked="false" data-do="set_strap"
  data-pressed="u.{escape(f"{unit.name}.pin.{pin.name}")}"
  data-args="{_args(unit.name, pin.name, f"!u.{unit.name}.pin.{pin.name}")}"
  aria-label="Strap {escape(pin.name)} of {escape(unit.name)}"
@@ -239,7 +269,8 @@ def _foot(unit: UnitPicture, line: LinePicture | None) -> str:
 <span>line {escape(line.name)}, on which {escape(line.host)} is the host</span></span></div>"""
     ends = "".join(
         f"""<button type="button" class="endpoint num" data-part="copy" data-copy="{escape(one.address)}"
- data-help="Where a host program connects to line {escape(line.name)}: click to copy">{escape(one.address)}</button>"""
+ data-help="Where a host program connects to line {escape(line.name)}: click to copy"
+>{escape(short(one.address))}</button>"""
         for one in line.endpoints
     )
     return f"""<form class="foot" data-part="command" data-unit="{name}">
@@ -248,6 +279,11 @@ def _foot(unit: UnitPicture, line: LinePicture | None) -> str:
 <button class="key" aria-label="Send to {name}">{icon("send")}</button>
 <span class="quiet where"><span data-live="l.{escape(line.name)}.format">{escape(line.format)}</span>
 {ends}</span></form>"""
+
+
+def short(address: str) -> str:
+    """An address as it fits a panel: of a long path its end."""
+    return address if len(address) <= LONGEST_ADDRESS else "…/" + address.rpartition("/")[2]
 
 
 def _loose_motor(picture: Picture, motor: MotorPicture, jacks: set[str]) -> str:
@@ -266,4 +302,4 @@ def _args(*values: object) -> str:
     return escape(json.dumps(values))
 
 
-PAGE = Page("Cell", "/", "cell", build, scripts=("wires.js", "cell.js"), styles=("cell.css",))
+PAGE = Page("Cell", "/", "cell", build, scripts=("wires.js", "cell.js", "breaking.js"), styles=("cell.css",))

@@ -132,6 +132,7 @@ def _page(units: "Sequence[UnitPicture]") -> str:
   <h2 id="program-dialog-title"></h2>
   <input class="field mono" name="name" autocomplete="off" spellcheck="false" aria-label="file name">
   <ul class="program-list"></ul>
+  <p class="program-asks" role="alert"></p>
   <div class="row"><span class="grow"></span><button type="button" class="key" value="cancel">Cancel</button>
     <button type="submit" class="key primary" value="ok"></button></div>
 </form></dialog>

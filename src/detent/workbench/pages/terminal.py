@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
+from detent.controllers.gsc200 import commands as gsc200
 from detent.workbench.errands import Errands
 from detent.workbench.icons import icon
 from detent.workbench.live import Live
@@ -52,8 +53,8 @@ def offer(site: "FastAPI", bench: "Bench", live: Live) -> None:
         first = rows[0].number if rows else talk.first
         return {"first": first, "next": talk.next, "cut": talk.cut, "rows": [_row(row) for row in rows]}
 
-    async def run_script(line: str, unit: str, text: str) -> None:
-        errands.start(line, unit, text)
+    async def run_script(line: str, unit: str, text: str, comment: str = ";") -> None:
+        errands.start(line, unit, text, comment)
 
     async def stop_script(line: str) -> None:
         errands.stop(line)
@@ -81,7 +82,13 @@ def markup(picture: Picture) -> str:
     if not lines:
         return '<p class="quiet nothing">No unit of this cell has a serial line.</p>'
     facts = {
-        line.name: {"units": list(line.units), "host": line.host, "words": _words(line, picture)} for line in lines
+        line.name: {
+            "units": list(line.units),
+            "host": line.host,
+            "words": _words(line, picture),
+            "added": _added(line, picture),
+        }
+        for line in lines
     }
     tabs = "".join(
         f'<button role="tab" data-line="{escape(line.name)}"><b>{escape(line.name)}</b>'
@@ -96,12 +103,18 @@ def markup(picture: Picture) -> str:
   <div class="ends quiet">{_ends(lines)}</div>
   <div class="rows" data-role="rows" role="log" aria-label="What was said" tabindex="0"></div>
   <button class="key small to-end" data-role="to-end">Latest</button>
+  <div class="waits" data-role="waits" role="group" aria-label="Commands that wait until time goes on" hidden></div>
   <form class="say" data-role="say">
     <select class="field" data-role="to" aria-label="To"></select>
     <input class="field mono grow" data-role="text" aria-label="Line to send" spellcheck="false" autocomplete="off"
       autocapitalize="off" list="said" placeholder="Command">
     <datalist id="said"></datalist>
+    <label class="every quiet" data-help="Send it again and again: how many seconds of the cell are between">every
+      <input class="field num" data-role="every" type="number" min="0.001" step="any"
+        aria-label="Again every so many seconds">
+      s</label>
     <button class="key primary" aria-label="Send">{icon("send")}<span>Send</span></button>
+    <button type="button" class="key" data-role="repeats" hidden>Stop repeating</button>
   </form>
   <div class="hint quiet" data-role="hint" aria-live="polite"></div>
 </section>
@@ -111,7 +124,7 @@ def markup(picture: Picture) -> str:
     <button class="key small" data-role="stop" disabled>Stop</button></div>
   <div class="sheet"><div class="numbers num" data-role="numbers" aria-hidden="true"></div>
   <textarea class="mono" data-role="script" spellcheck="false" autocapitalize="off" aria-label="Script"
-    placeholder="; one command a line&#10;@ 500 ms     ; a pause&#10;@ answer     ; wait for an answer"></textarea>
+    placeholder="; one command a line&#10;@ 500 ms  ; a pause&#10;@ answer  ; wait for one&#10;@ again"></textarea>
   </div>
   <div class="told quiet" data-role="told" aria-live="polite"></div>
   <div class="files row"><input class="field grow" data-role="file" list="scripts" aria-label="File"
@@ -133,6 +146,16 @@ def _ends(lines: Sequence[LinePicture]) -> str:
         + "</div>"
         for line in lines
     )
+
+
+def _added(line: LinePicture, picture: Picture) -> str:
+    """What is added to a command that is typed."""
+    models = {picture.units[unit].model for unit in line.units}
+    if models & set(gsc200.MODELS):
+        return "Address, checksum and the end of the frame are added."
+    if "supersigma" in models:
+        return "The command is sent as its bytes on the bus."
+    return "The end of the line is added."
 
 
 def _words(line: LinePicture, picture: Picture) -> dict[str, list[list[str]]]:
