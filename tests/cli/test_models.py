@@ -1,6 +1,7 @@
 """The verb models: the tables of a controller, for people, as JSON and in Markdown."""
 
 import json
+import re
 
 import pytest
 
@@ -48,3 +49,21 @@ def test_the_tables_for_people_and_in_markdown_have_them_too(model: str, capsys:
 def test_a_model_that_is_none_exits_with_2_and_says_which_was_meant(capsys: pytest.CaptureFixture[str]) -> None:
     assert detent("models", "gs-c200x") == 2
     assert "did you mean gs-c200" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_tables_can_be_read_aloud(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """No sentence breaks off, nothing is said twice, no punctuation meets another."""
+    with pytest.raises(SystemExit):
+        main(["models", model, "--json"])
+    tables = json.loads(capsys.readouterr().out)
+    for name in ("pins", "straps", "options", "commands"):
+        for row in tables.get(name, []):
+            for text in (str(value) for column, value in row.items() if column != "command"):
+                assert not re.search(r";,|,;|,,|;;|[^.]\.\.$|  |\w \b(and|or|the|a|of|to|then|with|for)\.?$", text), (
+                    text
+                )
+                assert not re.match(r"\d.*, -?\d+ to \d+$", text), text
+                assert text.count("(") == text.count(")"), text
+    for row in tables["commands"]:
+        assert row["what"].endswith("."), row

@@ -28,8 +28,8 @@ class Number(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Like "a position, -8388607 to 8388607"."""
-        return f"{self.what}, {self.low} to {self.high}"
+        """Like "a position, -8388607 to 8388607"; words that begin with the numbers are enough by themselves."""
+        return self.what if self.what[0].isdigit() else f"{self.what}, {self.low} to {self.high}"
 
     def read(self, number: int) -> int | None:
         """The value that is stored for what was typed; None if it is out of range."""

@@ -161,7 +161,7 @@ TABLE: Final[tuple[Row, ...]] = (
     Row(Op.NEXT_TRIP, (_POSITION, _OUTPUTS), 5, "Set the outputs now, and the position of the next special trip.", 42,
         typed=False),
     Row(Op.LOOP_ON_PORT, (Address("an address (2048 waits here)", 0, BRANCH, 2),
-                          _byte("2 (port - 1), 1 more for high", 9)), 4,
+                          _byte("twice (port - 1), 1 more for high", 9)), 4,
         "Jump to an address unless a port is low or high.", 44, typed=False, time=PORT_TEST),
     Row(Op.OPTIONS, (_byte("option flags, 128 reads them"),), 2, "Set the hardware options.", 44,
         result="with 128: the flags"),

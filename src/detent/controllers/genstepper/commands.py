@@ -68,8 +68,8 @@ class Row(NamedTuple):
 TABLE: Final[tuple[Row, ...]] = (
     Row(Op.LATCHES, "", Scope.BOARD, "Report and clear what was latched: 1 Y-, 2 Y+, 4 X-, 8 X+, 16 reset.", "29-30"),
     Row(Op.VERBOSE, "bits", Scope.BOARD, "1: CR LF before and behind the text of an answer; 2: later, slower.", "35"),
-    Row(Op.RESET, "1/64 steps, 1-64", Scope.BOARD, "Reset, with a microstep of so many 1/64 steps (0: 1/16); deaf for "
-        "250 ms then.", "37", blinds=True),
+    Row(Op.RESET, "1/64 steps, 1-64", Scope.BOARD, "Reset, with a microstep of so many 1/64 steps (0: 1/16); it "
+        "is deaf for 250 ms.", "37", blinds=True),
     Row(Op.REPORT, "report or memory", Scope.MOTORS, "Report: -1 to -12, 0 for -1 to -11, 1-255 memory.", "39-44"),
     Row(Op.AUTO, "microsteps/s", Scope.BOARD, "Full steps, full power while rate / 256 is above VALUE / 256.", "24"),
     Row(Op.DIRECT, "bits", Scope.BOARD, "Steps by pulses on the slew inputs: 1 a line each way, 2 step and direction, "

@@ -67,8 +67,8 @@ class Number(Argument):
 
     @property
     def words(self) -> str:
-        """Like "an input, 1 to 3"."""
-        return f"{self.what}, {self.low} to {self.high}"
+        """Like "an input, 1 to 3"; words that begin with the numbers are enough by themselves."""
+        return self.what if self.what[0].isdigit() else f"{self.what}, {self.low} to {self.high}"
 
     def numbers(self, *parts: str) -> tuple[int, int]:
         """The number; a letter that is not this argument's zero is out of every range."""

@@ -229,7 +229,7 @@ TABLE: Final[tuple[Row, ...]] = (
     ),
     Row(Op.KILL, ("K",), _NOTHING, 0, STOPPING, "Stop at once and end the program.", "K"),
     Row(
-        Op.LOOP, ("L",), Number(("0", "xxx"), "0 (mark) or the repetitions", 0, 255, "o"), 2, IN_PROGRAMS,
+        Op.LOOP, ("L",), Number(("0", "xxx"), "the repetitions, or 0 (mark)", 0, 255, "o"), 2, IN_PROGRAMS,
         "L0 marks the start of a loop; Ln runs it n times in all.", "Lo, Lxxx",
     ),
     Row(Op.MEMORY, ("M",), _NOTHING, 0, NOT_RUNNING, "Save the program to EEPROM.", "M"),
