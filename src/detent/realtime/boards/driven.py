@@ -70,10 +70,12 @@ class Driven(Mishaps):
         if self._pending:
             times.append(self._committed + COMMIT_EVERY)
         at = clock + min(times) - wall if times else None
-        behind = self._behind  # what was said and stored before that is certain
         held = min((line.first for line in self.lines), default=NEVER)
         tail = min((axle.guard.next for axle in self.axles), default=NEVER)
         first = min(held, self._stores.first)
+        if min(tail, first) == NEVER:
+            return at
+        behind = self._behind  # what was said and stored before that is certain
         if first + behind <= self.cell.now and self._horizon() < first:
             first = self.cell.now + COMMIT_EVERY - behind  # the boards were asked, and what they answer wakes it
         cell = min(tail, first) + behind
@@ -95,7 +97,7 @@ class Driven(Mishaps):
             self._happened(event)
         self._absorb()
         self._inquire()
-        over = self._stores.first <= self._horizon()
+        over = self._stores.first < NEVER and self._stores.first <= self._horizon()
         if events or over or wall - self._looked >= COMMIT_EVERY:
             self._looked = wall
             self._look()

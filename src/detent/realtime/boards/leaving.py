@@ -180,7 +180,7 @@ class Leaving:
         if not self.plan.held:
             return
         first = min(self._stores.first, *(line.first for line in self.lines), NEVER)
-        if first <= self.cell.now - self._behind and first > self._horizon():
+        if first < NEVER and first <= self.cell.now - self._behind and first > self._horizon():
             self.boards.inquire(self._wall())
 
     def _counts(self) -> tuple[int, ...]:
