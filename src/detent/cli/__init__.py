@@ -37,6 +37,8 @@ VERBS = {
     "download": ("detent.cli.program:download", "Read the program of a unit, as source with labels."),
     "compare": ("detent.cli.program:compare", "Compare the program of a unit with a source file."),
     "motor": ("detent.cli.motor:motor", "Say what a motor makes of its pulses: torque against speed, a move judged."),
+    "tune": ("detent.cli.tune:tune", "Find the fastest settings with which a motor and its load lose no step."),
+    "compare-moves": ("detent.cli.compare_moves:compare_moves", "Compare settings: times, loss rates, torque used."),
     "table": ("detent.cli.table:table", "Compile a curve into the table of differences of a SUPERSIGMA drive."),
     "size": ("detent.cli.size:size", "Compute supplies and currents for a controller, as its manual does."),
     "wiring": ("detent.cli.wiring:wiring", "Find a motor's windings from the resistances between its leads."),

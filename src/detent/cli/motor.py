@@ -151,7 +151,7 @@ def _list(json: bool) -> None:
         ]  # fmt: skip
         print(json_text.dumps({"motors": rows}))
         return
-    table = _table("motor", "", "A", "ohm", "mH", "Nm", "g cm2", "maker")
+    table = table_of("motor", "", "A", "ohm", "mH", "Nm", "g cm2", "maker")
     for motor in MOTORS.values():
         inertia = "-" if motor.inertia is None else f"{motor.inertia * 1e7:g}"
         values = (motor.current, motor.resistance, motor.inductance * 1e3, motor.holding_torque)
@@ -162,7 +162,7 @@ def _list(json: bool) -> None:
             inertia,
             motor.source.split()[0].split("-")[0],
         )
-    _print(table)
+    print_table(table)
     print("\ndetent motor NAME  shows torque against speed;  detent motor NAME --move 1000 --slew 2000  judges a move.")
 
 
@@ -193,14 +193,14 @@ def _curve(name: str, found: Made, facts: dict[str, Any], pull_in: bool, plot: P
         print(json_text.dumps(facts))
         return
     _print_head(found, facts)
-    table = _table(f"{found.drive.winding.name} steps/s", "full steps/s", "turns/min", "Nm", "W", "load angle", " ")
+    table = table_of(f"{found.drive.winding.name} steps/s", "full steps/s", "turns/min", "Nm", "W", "load angle", " ")
     for point in points:
         turns = point.rate / found.motor.steps
         beyond = fit is not None and not fit.low <= point.rate <= fit.high
         table.add_row(f"{point.rate * per_step:g}", f"{point.rate:g}", f"{turns * 60:g}", f"{point.torque:.3f}",
                       f"{point.torque * turns * 6.283185307:.1f}", f"{point.angle:.0f}\N{DEGREE SIGN}",
                       "not measured" if beyond else "")  # fmt: skip
-    _print(table)
+    print_table(table)
     if pull_in:
         _print_pull_in(found, facts)
     if plot is not None:
@@ -272,16 +272,9 @@ class _Law(NamedTuple):
 
     def winding(self, step: str | None) -> "Winding":
         """The stepping of the controller: the usual one, or the one asked for if it can."""
-        from detent.motors.motor import MotorError
+        from detent.moves.law import winding_of
 
-        windings = {winding.name: winding for winding in self.law.windings}
-        if not windings:
-            raise MotorError("the size of these microsteps divides no full step: no motor can be judged with it")
-        if step is None:
-            return next(iter(windings.values()))  # type: ignore[no-any-return]
-        if step not in windings:
-            raise MotorError(f"a {self.law.model} does no {step!r}; there are: {', '.join(windings)}")
-        return windings[step]  # type: ignore[no-any-return]
+        return winding_of(self.law, step)
 
 
 class _Move(NamedTuple):
@@ -417,7 +410,7 @@ def _judge(
     print(f"  {_line(verdict, move.rig)}" if loss is None else f"  steps {loss}")
     print(f"  {rate}" if rate is not None else f"  {why_not}")
     if rate is not None:
-        print(f"  variants: {_ranges(many.spread.of(move.rig))}")
+        print(f"  variants: {ranges_of(many.spread.of(move.rig))}")
     print(f"  assumed: {'; '.join(move.found.words)}")
     if sensitivity:
         print()
@@ -452,7 +445,8 @@ def _line(verdict: "Verdict", rig: "Rig") -> str:
     return words
 
 
-def _ranges(spread: Any) -> str:
+def ranges_of(spread: Any) -> str:
+    """What variants differ in, in words."""
     names = {"torque_constant": "torque"}
     return ", ".join(
         f"{names.get(name, name)} x{low:g}-{high:g}" for name, (low, high) in spread._asdict().items() if low != high
@@ -492,11 +486,11 @@ def _sensitivity(rig: "Rig", train: Any) -> dict[str, list[dict[str, Any]]]:
 
 
 def _print_sensitivity(found: dict[str, list[dict[str, Any]]]) -> None:
-    table = _table("margin with", *(f"x{factor:g}" for factor in FACTORS))
+    table = table_of("margin with", *(f"x{factor:g}" for factor in FACTORS))
     for quantity, rows in found.items():
         cells = {row["factor"]: "[red]lost[/red]" if row["lost"] else f"{row['margin']:.0%}" for row in rows}
         table.add_row(quantity, *(cells.get(factor, "-") for factor in FACTORS))
-    _print(table)
+    print_table(table)
 
 
 # -- printing ------------------------------------------------------------------------------------------------
@@ -517,7 +511,8 @@ def _print_head(found: Made, facts: dict[str, Any]) -> None:
     print()
 
 
-def _table(*columns: str) -> Any:
+def table_of(*columns: str) -> Any:
+    """A table without a frame; numbers stand at the right."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="dim")
@@ -527,7 +522,8 @@ def _table(*columns: str) -> Any:
     return table
 
 
-def _print(table: Any) -> None:
+def print_table(table: Any) -> None:
+    """Print it as wide as the terminal is."""
     from rich.console import Console
 
     Console(highlight=False).print(table)

@@ -149,14 +149,14 @@ class Ensemble:
 
     def judge(self, pulses: Pulses, *, settle: Ns = SETTLE, begin: Ns = 0) -> Outcomes:
         """What becomes of the move in each variant."""
-        return _outcomes(_Move(self.rig, pulses, settle, begin), self.parameters, self._lanes(), self._substep())
+        return _outcomes(_Move(self.rig, pulses, settle, begin), self.parameters, self._lanes(), self.substep)
 
     def survives(self, pulses: Pulses, *, settle: Ns = SETTLE, begin: Ns = 0) -> int | None:
         """None if no variant loses a step; else the index of one that does, found as early as may be.
 
         The first variants are looked at first: put those in front that lost other moves.
         """
-        move, substep, first, block = _Move(self.rig, pulses, settle, begin), self._substep(), 0, FIRST_BLOCK
+        move, substep, first, block = _Move(self.rig, pulses, settle, begin), self.substep, 0, FIRST_BLOCK
         lanes = self._lanes()
         while first < len(self):
             some = slice(first, first + block)
@@ -170,7 +170,9 @@ class Ensemble:
         """The factor on the load's torque where it is not steady."""
         return self.factors[:, QUANTITIES.index("load")]
 
-    def _substep(self) -> Ns:
+    @property
+    def substep(self) -> Ns:
+        """The substep with which all of them are judged."""
         par = self.parameters
         limits = limit_of(par[kernel.R], par[kernel.L], par[kernel.J], par[kernel.TEETH], par[kernel.KT],
                           self.rig.motor.current)  # fmt: skip

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from detent.motors.motor import MotorError
 from detent.motors.winding import Winding
 from detent.pulses import Train
 
@@ -74,6 +75,18 @@ def clipped(law: Law, values: Values) -> dict[str, int]:
         setting.name: min(max(round(values.get(setting.name, setting.value)), setting.low), setting.high)
         for setting in law.settings
     }
+
+
+def winding_of(law: Law, step: str | None) -> Winding:
+    """What a pulse turns the field by: as is usual with this law, or as named if it can. MotorError."""
+    windings = {winding.name: winding for winding in law.windings}
+    if not windings:
+        raise MotorError("the size of these microsteps divides no full step: no motor can be judged with it")
+    if step is None:
+        return next(iter(windings.values()))
+    if step not in windings:
+        raise MotorError(f"a {law.model} does no {step!r}; there are: {', '.join(windings)}")
+    return windings[step]
 
 
 def usual_first(windings: Sequence[Winding]) -> tuple[Winding, ...]:

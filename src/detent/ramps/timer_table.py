@@ -18,7 +18,8 @@ from detent.ticks import FIXED_BITS, SECOND, Fixed, Ns
 TICK: Final[Ns] = 8_036
 LEAST_COUNT: Final = 3  # 41 480 steps/s, the "42,000 SPS ceiling" (page 65)
 SLOWEST: Final = 40  # steps/s; less is limited to it (page 65)
-_SQUARE: Final = 119_990_116  # 1095.4 squared, times 100
+RUNG_SPEED: Final = 1095.4  # steps/s of the first entry
+_SQUARE: Final = 119_990_116  # its square, times 100
 _ENTRIES: Final = 1 << 10
 
 

@@ -1,0 +1,322 @@
+"""The verb `tune`: the fastest settings of a controller with which a motor and its load lose no step."""
+
+import json as json_text
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from detent.cli.rig import Made, Options, RigOptions
+
+if TYPE_CHECKING:
+    from detent.tuner.search import Cancelled, Watch
+    from detent.tuner.tune import Rival, Tuned
+
+INTERRUPTED = 130
+
+
+def tune(
+    model: str,
+    *,
+    motor: str,
+    moves: str,
+    rig: Options = RigOptions(),  # noqa: B008 (never changes)
+    set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
+    axis: str = "",
+    vary: Annotated[list[str] | None, Parameter(consume_multiple=True)] = None,
+    no_corners: bool = False,
+    variants: int = 2048,
+    seed: int = 1,
+    each_move: bool = False,
+    map_: Annotated[list[Path] | None, Parameter(name="--map")] = None,
+    into: Path | None = None,
+    from_: Annotated[Path | None, Parameter(name="--from")] = None,
+    force: bool = False,
+    json: bool = False,
+) -> None:
+    """Find the fastest settings with which a motor and its load lose no step.
+
+    The settings are the controller's own: S, T, R of a GS-C200; I, V, K of a DCB-274; K, R, P and the step size of a
+    BS0610 or BS0710; the table of a SUPERSIGMA. The pulses that are judged are those that it gives for the commands
+    printed. Ctrl-C prints the best so far.
+
+    Parameters
+    ----------
+    model
+        The controller: gs-c200, dcb-274, supersigma, bs0610, ...
+    motor
+        A motor by name, like qsh4218-41-10-035, or a TOML file of your own.
+    moves
+        What is to be fast: 200,1000x3,5000 is 200 steps, 1000 three times as often, and 5000.
+    rig
+        Drive and load.
+    set_
+        An option of the model: --set step_size=4 keeps the microstep of a BS0610.
+    axis
+        Which motor of a board that has several: X or Y.
+    vary
+        What machines differ in: inertia=0.2 (a part either way) or friction=0.3-2 (factors).
+    no_corners
+        Do not ask that every corner of these ranges makes the moves.
+    variants
+        How many fresh variants must make them in the end (2048).
+    seed
+        Of the draws: the same seed gives the same answer.
+    each_move
+        Settings for each move alone, to be sent before it.
+    map_
+        Draw how many variants lose over slew speed and ramp: a .png, .svg or .pdf file; or a .csv file of the numbers.
+    into
+        Write the settings to this file: a program, or what --from names with these settings in place of its own.
+    from_
+        A program, a backup or a cell file that sets such settings; it is left as it is.
+    force
+        Write over files that are there.
+    json
+        Print everything as one line of JSON.
+    """
+    from detent.cli.endings import asked_wrongly, failed
+    from detent.cli.rig import made, spread_of
+    from detent.moves.law import winding_of
+    from detent.tuner import tune as tuning
+    from detent.tuner.task import Task, check_rig, moves_of
+
+    try:
+        outputs = [*(map_ or []), *([into] if into is not None else [])]
+        _check(outputs, map_ or [], from_, into, force, each_move)
+        asked, options = moves_of(moves), _options(set_)
+        found = made(motor, rig, winding_of(_law(model, options, axis), _step(rig, model)))
+        task = Task(model, check_rig(found.rig, found.motor.name), asked, options, axis, spread_of(vary), seed,
+                    not no_corners, final=variants)  # fmt: skip
+        with _interruptible() as cancelled, _watch() as watch:
+            do: Any = tuning.each_move if each_move else tuning.tune
+            done = do(task, watch=watch, cancelled=cancelled)
+            answers: list[Tuned] = done if each_move else [done]
+            if answers[0].found.whole and map_:
+                _map(answers[0], map_, watch, cancelled)
+        if into is not None:
+            _into(answers[0], into, from_)
+    except ValueError as error:  # TunerError, MotorError, SettingError, CatalogueError
+        asked_wrongly(error)
+    except ImportError as error:
+        failed(error)
+    except OSError as error:
+        failed(f"{error.filename}: {error.strerror}")
+    if json:
+        facts = [_facts(one, found) for one in answers]
+        print(json_text.dumps({"each_move": facts} if each_move else facts[0]))
+    else:
+        _print(answers, found, [str(path) for path in outputs])
+    if not all(one.found.whole for one in answers):
+        raise SystemExit(INTERRUPTED)
+
+
+def _options(words: list[str] | None) -> dict[str, object]:
+    options: dict[str, object] = {}
+    for word in words or ():
+        name, equals, value = word.partition("=")
+        if not equals or not name.strip():
+            raise ValueError(f"--set {word}: write OPTION=VALUE, like step_size=4")
+        options[name.strip().replace("-", "_")] = value.strip()
+    return options
+
+
+def _law(model: str, options: dict[str, object], axis: str) -> Any:
+    from detent.moves.laws import law
+
+    return law(model, options, axis)
+
+
+def _step(rig: RigOptions, model: str) -> str | None:
+    """The stepping asked for. ValueError where that is a setting of the controller."""
+    if rig.step is not None and model.lower().startswith("bs0"):
+        raise ValueError(f"--step {rig.step}: the step size of a {model} is an option: --set step_size=4 is 1/16")
+    return rig.step
+
+
+def _check(
+    outputs: list[Path], maps: list[Path], from_: Path | None, into: Path | None, force: bool, each: bool
+) -> None:
+    from detent.outputs import figures
+
+    if from_ is not None and into is None:
+        raise ValueError("--from: where to? Name another file with --into")
+    if each and (maps or into is not None):
+        raise ValueError("--each-move gives several settings: --map and --into are for one")
+    for path in maps:
+        if path.suffix.lower() != ".csv":
+            figures.check(path)
+    for path in outputs:
+        if from_ is not None and path.exists() and from_.exists() and path.samefile(from_):
+            raise ValueError(f"{path} is read here, and would be lost: write to another file")
+        if path.exists() and not force:
+            raise ValueError(f"{path} is there already: write to another file, or over it with --force")
+    if from_ is not None and not from_.is_file():
+        raise ValueError(f"--from {from_}: there is no such file")
+
+
+@contextmanager
+def _interruptible() -> "Iterator[Cancelled]":
+    """Ctrl-C stops at the next judgement; a second one at once."""
+    pressed: list[int] = []
+
+    def press(number: int, frame: object) -> None:
+        if pressed:
+            raise KeyboardInterrupt
+        pressed.append(number)
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _watch() -> "Iterator[Watch]":
+    from detent.cli.unit import progress
+    from detent.hosts.exchange import Progress as Step
+
+    with progress("tuning") as bar:
+
+        def watch(step: Any) -> None:
+            best = "" if step.best is None else f", lossless at {step.best:.4g} s"
+            bar(Step(step.done, max(step.total, 1), f"{step.doing}{best}"))
+
+        yield watch
+
+
+def _map(tuned: "Tuned", paths: list[Path], watch: "Watch", cancelled: "Cancelled") -> None:
+    from detent.outputs import tuning_figures
+    from detent.outputs.files import write_whole
+    from detent.tuner.map import loss_map
+
+    found = loss_map(tuned.task, tuned.found.point, watch=watch, cancelled=cancelled)
+    for path in paths:
+        if path.suffix.lower() == ".csv":
+            write_whole(path, found.csv().encode())
+            continue
+        moves = ", ".join(str(move.steps) for move in tuned.task.moves)
+        title = f"{tuned.task.model}: where {tuned.task.rig.motor.name} loses steps"
+        about = f"moves of {moves} steps  \N{MIDDLE DOT}  {found.variants} variants a point  \N{MIDDLE DOT}  "
+        tuning_figures.write_map(path, found.x, found.y, found.lost, found.times, found.chosen, names=found.names,
+                                 title=title, about=about + str(tuned.found.profile))  # fmt: skip
+
+
+def _into(tuned: "Tuned", into: Path, from_: Path | None) -> None:
+    from detent.cli.rig import text_of
+    from detent.outputs.files import write_whole
+    from detent.tuner.into import program, put_into
+    from detent.tuner.task import TunerError
+
+    if from_ is None:
+        write_whole(into, program(tuned.task, tuned.found.profile).encode())
+        return
+    try:
+        changed = put_into(text_of(from_), tuned.found.profile, tuned.task.axis)
+    except TunerError as error:
+        raise TunerError(f"{from_}: {error}") from None
+    write_whole(into, changed.text.encode())
+    print(f"{into}: {', '.join(changed.replaced)}", file=sys.stderr)
+
+
+# -- what is printed ----------------------------------------------------------------------------------------
+
+
+def _facts(tuned: "Tuned", made: Made) -> dict[str, Any]:
+    task, found = tuned.task, tuned.found
+    check = found.check
+    facts: dict[str, Any] = {
+        "model": task.model, "motor": task.rig.motor.name, "complete": found.whole,
+        "settings": dict(found.profile.values), "options": dict(found.profile.options),
+        "commands": list(found.profile.settings),
+        "moves": [
+            {"steps": move.steps, "weight": move.weight, "go": found.profile.go(move.steps), "time_s": time,
+             "bound_s": {"nominal": nominal, "worst": worst}}
+            for move, time, nominal, worst in zip(task.moves, found.times, *tuned.bound, strict=True)
+        ],
+        "time_s": found.time, "bound_s": tuned.bound_time, "ratio": tuned.ratio,
+        "check": {"variants": check.variants, "lost": check.lost, "corners": check.corners,
+                  "corners_lost": check.corners_lost, "looks": check.looks, "rate_below": check.bound,
+                  "survived": check.met},
+        "hand": _rival(tuned.hand), "hand_safe": _rival(tuned.safe_hand),
+        "models": [model._asdict() for model in tuned.models], "fails_first": [one._asdict() for one in tuned.fails],
+        "assumed": list(made.words), "seed": task.seed,
+    }  # fmt: skip
+    return facts
+
+
+def _rival(rival: "Rival | None") -> dict[str, Any] | None:
+    if rival is None:
+        return None
+    return {"settings": dict(rival.profile.values), "options": dict(rival.profile.options),
+            "commands": list(rival.profile.settings), "moves_s": list(rival.times), "time_s": rival.time,
+            "variants": rival.tried, "lost": rival.lost}  # fmt: skip
+
+
+def _print(answers: "list[Tuned]", made: Made, outputs: list[str]) -> None:
+    from detent.cli.motor import ranges_of
+
+    drive, first = made.drive, answers[0]
+    print(f"{first.task.model} with {made.motor.name}: {drive.supply:g} V, {drive.current:g} A, "
+          f"{first.found.profile.winding.name} step, {drive.name or drive.decay}")  # fmt: skip
+    for tuned in answers:
+        print()
+        _print_one(tuned)
+    print(f"\nvariants: {ranges_of(first.task.ranges)}")
+    print("assumed: " + "; ".join(made.words))
+    for path in outputs:
+        if Path(path).exists():
+            print(f"Wrote {path}")
+
+
+def _print_one(tuned: "Tuned") -> None:
+    from detent.cli.motor import print_table, table_of
+
+    task, found, profile = tuned.task, tuned.found, tuned.found.profile
+    if not found.whole:
+        print("stopped: the best so far, which nothing has proved yet")
+    for line in profile.settings:
+        print(f"  {line}")
+    for name, value in profile.options.items():
+        if name != "step_size" or not profile.before:
+            print(f"  option {name} = {value}")
+    columns = ["move", "sent as", "found"]
+    rivals = [("by hand", tuned.hand)] if tuned.hand is not None else []
+    if tuned.safe_hand is not None and tuned.safe_hand != tuned.hand:
+        rivals.append(("by hand, made safe", tuned.safe_hand))
+    table = table_of(*columns, *(name for name, _ in rivals), "bound")
+    shown = range(len(task.moves))
+    for k in shown:
+        move = task.moves[k]
+        often = "" if move.weight == 1 else f" x{move.weight:g}"
+        table.add_row(f"{move.steps}{often}", profile.go(move.steps), f"{found.times[k]:.4f} s",
+                      *(f"{rival.times[k]:.4f} s" for _, rival in rivals), f"{tuned.bound.worst[k]:.4f} s")  # fmt: skip
+    if len(task.moves) > 1 or task.moves[0].weight != 1:
+        table.add_row("all", "", f"{found.time:.4f} s", *(f"{rival.time:.4f} s" for _, rival in rivals),
+                      f"{tuned.bound_time:.4f} s")  # fmt: skip
+    print()
+    print_table(table)
+    print()
+    print(f"found:   {found.check}")
+    if tuned.hand is not None:
+        print(f"by hand: {tuned.hand.profile} by the manual's rule, {tuned.hand.lost} of {tuned.hand.tried} lost")
+        if tuned.safe_hand is None:
+            print("         no longer ramp makes it safe")
+        elif tuned.safe_hand != tuned.hand:
+            print(f"         made safe: {tuned.safe_hand.profile}")
+    print("bound:   what torque allows at its worst corner, from and to standstill; "
+          f"found takes {tuned.ratio:.2f} times that")  # fmt: skip
+    if task.both_ways:
+        print("judged in both directions, as the load pulls")
+    if tuned.fails:
+        names = {"torque_constant": "torque"}
+        words = [f"{names.get(one.quantity, one.quantity)} x{one.factor:.2f}" for one in tuned.fails[:4]]
+        print(f"fails first, one at a time: {', '.join(words)}")
+    if tuned.models:
+        words = [f"{one.name} {one.lost}" for one in tuned.models]
+        print(f"in other models, lost of {tuned.models[0].tried}: {', '.join(words)}")

@@ -1,0 +1,207 @@
+"""Best first: the fastest setting that survives, whoever does the work; what is proved of it; what is refused."""
+
+import pickle
+from collections.abc import Sequence
+
+import pytest
+
+from detent.motors import chance
+from detent.motors.drive import Drive
+from detent.motors.load import Load
+from detent.motors.named import motor
+from detent.motors.rotor import Rig
+from detent.tuner.grid import Dimension
+from detent.tuner.judge import Job, Judge, Lost, judge_of, one_by_one
+from detent.tuner.map import loss_map
+from detent.tuner.search import Progress, Stopped, grid_points, search
+from detent.tuner.spaces import Point
+from detent.tuner.task import NOMINAL, Move, Task, TunerError, moves_of
+
+RIG = Rig(motor("qsh4218-41-10-035"), Drive(24, 1.0), Load(inertia=1.5e-5, friction=0.02))
+
+
+def task(moves: str = "120", **other: object) -> Task:
+    """A small task; `coarse` puts 300 points in the place of its grid."""
+    return Task("gs-c200", RIG, moves_of(moves), **{"screened": 128, "final": 256, **other})  # type: ignore[arg-type]
+
+
+def coarse(made: Task) -> Judge:
+    judge = judge_of(made)
+    start, slew, ramp = judge.space.dimensions
+    judge.space = judge.space._replace(dimensions=(
+        start._replace(values=(40, 60, 90, 120, 150)), slew._replace(values=(200, 260, 330, 420, 540, 700)),
+        ramp._replace(values=(8, 12, 17, 24, 34, 48, 68, 96, 136, 190)),
+    ))  # fmt: skip
+    return judge
+
+
+def test_best_first_is_what_trying_everything_finds() -> None:
+    made = task(refined=False)
+    judge = coarse(made)
+    found = search(made)
+    order = list(grid_points(judge))
+    assert len(order) == 300
+    assert order == sorted(order)
+    variants = tuple(sorted(found.examples))
+    safe = [(time, point) for time, point in order if not judge.answer(Job(point, variants, to_the_end=True))]
+    assert safe[0] == (found.time, found.point)
+    assert safe[0] > order[0]  # the fastest of all is none
+    assert set(made.corners) < set(found.examples)
+
+
+def test_the_answer_is_that_of_the_task_however_the_work_is_divided() -> None:
+    def pieces(of: Task, jobs: Sequence[Job]) -> list[Lost]:
+        """The last job first, each by somebody who has only read what was sent."""
+        answers = []
+        for job in reversed(jobs):
+            other = pickle.loads(pickle.dumps(of))
+            one = Judge(other)
+            one.space = judge_of(of).space
+            answers.append(one.answer(job))
+        return list(reversed(answers))
+
+    alone, divided = task("60", refined=False), task("60", refined=False)
+    coarse(alone)
+    coarse(divided)
+    one, other = search(alone), search(divided, run=pieces, ahead=5)
+    assert (one.point, one.times, one.check) == (other.point, other.times, other.check)
+    assert sorted(one.examples) == sorted(other.examples)
+
+
+def test_no_verdict_hangs_on_who_is_judged_beside() -> None:
+    made = task()
+    judge = coarse(made)
+    variants = (NOMINAL, *made.corners, *made.drawn(5, 200))
+    point = (150, 540, 24)
+    whole = judge.answer(Job(point, variants, to_the_end=True))
+    parts = [judge.answer(Job(point, variants[k : k + 37], to_the_end=True)) for k in range(0, len(variants), 37)]
+    assert whole == tuple(one for part in parts for one in part)
+    assert 0 < len(whole) < len(variants)
+    first = judge.answer(Job(point, variants))
+    assert len(first) == 1
+    assert first[0] in whole
+
+
+class Planted:
+    """A runner that knows nothing of motors: which variants lose is told by the point."""
+
+    def __init__(self, least_ramp: int, planted: Point = (), rare: tuple[int, ...] = ()) -> None:
+        self.least_ramp, self.planted, self.rare = least_ramp, planted, rare
+        self.asked: list[Job] = []
+
+    def __call__(self, _: Task, jobs: Sequence[Job]) -> list[Lost]:
+        self.asked += jobs
+        return [self.answer(job) for job in jobs]
+
+    def answer(self, job: Job) -> Lost:
+        if job.point == self.planted:
+            lost = tuple(one for one in job.variants if one in self.rare)
+        else:
+            lost = job.variants if job.point[2] < self.least_ramp else ()
+        return lost if job.to_the_end else lost[:1]
+
+
+def test_a_fragile_optimum_is_refused_by_the_final_look_and_the_bound_counts_the_looks() -> None:
+    made = task(refined=False)
+    judge = coarse(made)
+    planted = next(point for _, point in grid_points(judge))
+    rare = made.drawn(400, 256)[::100]  # three variants, behind those that are screened
+    found = search(made, run=(run := Planted(24, planted, rare)))
+    assert found.point[2] >= 24
+    assert set(rare[:1]) <= set(found.examples)
+    final = [job for job in run.asked if job.fine]
+    assert {job.point for job in final} == {planted, found.point}
+    assert found.check.looks == 2
+    assert found.check.bound == chance.bound(0, 256, looks=2) > chance.bound(0, 256)
+    seen = [variant for job in final for variant in job.variants if variant not in made.corners]
+    assert len(seen) == len(set(seen)) == 512  # each look has variants that nobody has met
+    assert "2 looks counted" in str(found.check)
+
+
+def test_a_winner_at_the_edge_of_the_grid_widens_it() -> None:
+    made = task()
+    judge = coarse(made)
+    judge.space = judge.space._replace(dimensions=(
+        *judge.space.dimensions[:2], judge.space.dimensions[2]._replace(values=(400, 500, 600)))
+    )  # fmt: skip
+    found = search(made, run=Planted(5))
+    assert 5 <= found.point[2] < 400
+
+
+def test_between_the_points_of_the_grid_there_are_faster_ones() -> None:
+    rough, fine = task(refined=False), task()
+    coarse(rough)
+    coarse(fine)
+    assert search(fine, run=Planted(20)).time < search(rough, run=Planted(20)).time
+
+
+def test_a_search_that_is_stopped_says_what_it_has() -> None:
+    made = task(refined=False)
+    coarse(made)
+    told: list[Progress] = []
+    stopped = search(made, run=Planted(24), watch=told.append, cancelled=lambda: any(one.best for one in told))
+    assert not stopped.whole
+    assert stopped.point[2] >= 24
+    assert stopped.check.variants == 0
+    assert stopped.check.bound == 1
+    assert "no fresh ones yet" in str(stopped.check)
+    with pytest.raises(Stopped):
+        search(made, run=Planted(24), cancelled=lambda: True)
+
+
+def test_progress_counts_up_to_what_it_said() -> None:
+    made = task(refined=False)
+    coarse(made)
+    told: list[Progress] = []
+    search(made, run=Planted(90), watch=told.append)
+    done = [one.done for one in told]
+    assert done == sorted(done)
+    assert all(one.done <= one.total for one in told)
+
+
+def test_where_nothing_is_without_loss_it_is_said_why() -> None:
+    made = Task("gs-c200", Rig(RIG.motor, RIG.drive, Load(inertia=2e-3, friction=0.02)), moves_of("150"), screened=8)
+    coarse(made)
+    with pytest.raises(TunerError, match=r"no settings on the grid .* lost after pulse"):
+        search(made)
+    stuck = Rig(RIG.motor, RIG.drive, Load(inertia=1e-5, friction=1.0))
+    with pytest.raises(TunerError, match="does not turn this load"):
+        judge_of(Task("gs-c200", stuck, moves_of("150")))
+
+
+def test_moves_are_read_as_people_write_them() -> None:
+    assert moves_of("200,1000x3, 5000X0.5") == (Move(200), Move(1000, 3), Move(5000, 0.5))
+    for wrong in ("", "x3", "200,", "0", "-5", "1e3", "10x0", "10xnan", "10x"):
+        with pytest.raises(TunerError, match="--moves"):
+            moves_of(wrong)
+    with pytest.raises(TunerError, match="at most"):
+        task("999999999")
+    with pytest.raises(TunerError, match="--variants"):
+        task(final=0)
+
+
+def test_a_map_has_a_rate_and_a_time_for_each_point() -> None:
+    made = task("80")
+    judge = coarse(made)
+    point = judge.space.hand
+    found = loss_map(made, point, columns=4, rows=3, variants=16)
+    assert found.lost.shape == found.times.shape == (len(found.y), len(found.x))
+    assert found.x[0] <= point[1] <= found.x[-1]
+    rows = found.csv().splitlines()
+    assert rows[0].startswith("T,R,")
+    assert len(rows) == 1 + len(found.x) * len(found.y)
+    assert (found.times[0] <= found.times[-1]).all()  # longer ramps take longer
+    with pytest.raises(TunerError, match="not written"):
+        loss_map(made, point, columns=2, rows=2, variants=4, cancelled=lambda: True)
+
+
+def test_a_grid_is_widened_at_its_end_and_not_beyond_what_a_command_takes() -> None:
+    grid = Dimension("R", 1, 999, (10, 20, 40))
+    wider, added = grid.wider(40)
+    assert wider.values == (10, 20, 40, 80, 160, 320, 640)
+    assert added == (80, 160, 320, 640)
+    assert wider.wider(640)[1] == (999,)
+    assert grid.wider(20) == (grid, ())
+    assert all(10 < value < 40 for value in grid.near(20))
+    assert grid.near(20)[len(grid.near(20)) // 2] == 20
+    assert one_by_one is not None
