@@ -6,6 +6,7 @@ is judged beside it nor on who does it.
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -46,8 +47,12 @@ class Judge:
 
     def __init__(self, task: Task) -> None:
         self.task = task
-        self.space: Space = space(task)
         self._kept: OrderedDict[Point, tuple[Profile, tuple[Train, ...]] | None] = OrderedDict()
+
+    @cached_property
+    def space(self) -> Space:
+        """What may be chosen."""
+        return space(self.task)
 
     def trains(self, point: Point) -> tuple[Profile, tuple[Train, ...]] | None:
         """The profile of a point and the train of each move; None where there is no such profile."""
