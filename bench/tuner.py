@@ -41,7 +41,7 @@ def rows() -> list[Row]:
     return [
         Row("moves of 200, 1000 and 5000, found", found.found.time, "s", "by hand, made safe, s",
             found.safe_hand.time if found.safe_hand else 0.0, 1.21),
-        Row(f"lost of {FRESH} fresh variants and 128 corners", check.lost + check.corners_lost, "", "allowed", 0.0, 0.0),
+        Row(f"lost of {FRESH} fresh and 128 corners", check.lost + check.corners_lost, "", "allowed", 0.0, 0.0),
         Row("search and comparison, CPU", searched, "s", "allowed, s", 30.0, 30.0),
         Row(f"map of {drawn.lost.size} points by 32 variants, CPU", mapped, "s", "allowed, s", 15.0, 15.0),
         Row("part of that map without loss", lossless, "", "", 0.0, None),

@@ -35,7 +35,7 @@ def tune(
     map_: Annotated[list[Path] | None, Parameter(name="--map")] = None,
     into: Path | None = None,
     from_: Annotated[Path | None, Parameter(name="--from")] = None,
-    force: bool = False,
+    overwrite: bool = False,
     json: bool = False,
 ) -> None:
     """Find the fastest settings with which a motor and its load lose no step.
@@ -74,7 +74,7 @@ def tune(
         Write the settings to this file: a program, or what --from names with these settings in place of its own.
     from_
         A program, a backup or a cell file that sets such settings; it is left as it is.
-    force
+    overwrite
         Write over files that are there.
     json
         Print everything as one line of JSON.
@@ -87,7 +87,7 @@ def tune(
 
     try:
         outputs = [*(map_ or []), *([into] if into is not None else [])]
-        _check(outputs, map_ or [], from_, into, force, each_move)
+        _check(outputs, map_ or [], from_, into, overwrite, each_move)
         asked, options = moves_of(moves), _options(set_)
         found = made(motor, rig, winding_of(_law(model, options, axis), _step(rig, model)))
         task = Task(model, check_rig(found.rig, found.motor.name), asked, options, axis, spread_of(vary), seed,
@@ -139,7 +139,7 @@ def _step(rig: RigOptions, model: str) -> str | None:
 
 
 def _check(
-    outputs: list[Path], maps: list[Path], from_: Path | None, into: Path | None, force: bool, each: bool
+    outputs: list[Path], maps: list[Path], from_: Path | None, into: Path | None, overwrite: bool, each: bool
 ) -> None:
     from detent.outputs import figures
 
@@ -153,8 +153,8 @@ def _check(
     for path in outputs:
         if from_ is not None and path.exists() and from_.exists() and path.samefile(from_):
             raise ValueError(f"{path} is read here, and would be lost: write to another file")
-        if path.exists() and not force:
-            raise ValueError(f"{path} is there already: write to another file, or over it with --force")
+        if path.exists() and not overwrite:
+            raise ValueError(f"{path} is there already: write to another file, or over it with --overwrite")
     if from_ is not None and not from_.is_file():
         raise ValueError(f"--from {from_}: there is no such file")
 
