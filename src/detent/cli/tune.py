@@ -11,19 +11,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from detent.cli.rig import Made, Options, RigOptions
+from detent.cli.tune_on import NO_MACHINE, MachineOptions
 
 if TYPE_CHECKING:
     from detent.tuner.search import Cancelled, Watch
     from detent.tuner.tune import Rival, Tuned
 
 INTERRUPTED = 130
+Machine = Annotated[MachineOptions, Parameter(name="*")]
 
 
 def tune(
     model: str,
     *,
-    motor: str,
+    motor: str | None = None,
     moves: str,
+    machine: Machine = NO_MACHINE,
     rig: Options = RigOptions(),  # noqa: B008 (never changes)
     set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
     axis: str = "",
@@ -49,9 +52,11 @@ def tune(
     model
         The controller: gs-c200, dcb-274, supersigma, bs0610, ...
     motor
-        A motor by name, like qsh4218-41-10-035, or a TOML file of your own.
+        A motor by name, like qsh4218-41-10-035, or a TOML file of your own; not needed with --on.
     moves
         What is to be fast: 200,1000x3,5000 is 200 steps, 1000 three times as often, and 5000.
+    machine
+        Trials on the machine itself, in place of a model of the motor.
     rig
         Drive and load.
     set_
@@ -86,6 +91,13 @@ def tune(
     from detent.tuner.task import Task, check_rig, moves_of
 
     try:
+        if machine.on is not None:
+            _on_the_machine(model, motor, moves, rig, machine, axis, json)
+            return
+        if motor is None:
+            raise ValueError("--motor: name one (detent motor lists them), or a TOML file of your own; or --on PORT")
+        if machine != NO_MACHINE:
+            raise ValueError("--witness, --travel and the like are of trials on a machine: say where it is: --on PORT")
         outputs = [*(map_ or []), *([into] if into is not None else [])]
         _check(outputs, map_ or [], from_, into, overwrite, each_move)
         asked, options = moves_of(moves), _options(set_)
@@ -113,6 +125,19 @@ def tune(
         _print(answers, found, [str(path) for path in outputs])
     if not all(one.found.whole for one in answers):
         raise SystemExit(INTERRUPTED)
+
+
+def _on_the_machine(
+    model: str, motor: str | None, moves: str, rig: RigOptions, machine: MachineOptions, axis: str, json: bool
+) -> None:
+    from dataclasses import replace
+
+    from detent.cli.tune_on import tune_on
+    from detent.tuner.task import moves_of
+
+    if motor is not None or replace(rig, step=None) != RigOptions():
+        raise ValueError("--on: trials on a machine need no model: leave --motor and the load out")
+    tune_on(model, [move.steps for move in moves_of(moves)], rig.step, machine, axis=axis, json=json)
 
 
 def _options(words: list[str] | None) -> dict[str, object]:

@@ -1,0 +1,70 @@
+"""`detent tune` and `compare-moves`, as their users type them."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from detent.cli import main
+
+RIG = ["--motor", "qsh4218-41-10-035", "--inertia", "1.5e-5", "--friction", "0.02"]
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> str:
+    with pytest.raises(SystemExit) as ended:
+        main(list(words))
+    told = capsys.readouterr()
+    assert (ended.value.code or 0) == code, told.err
+    return told.out if not code else told.err
+
+
+def test_a_tuned_move_is_told_with_what_is_proved_of_it(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    program, table = tmp_path / "tuned.gsc", tmp_path / "map.csv"
+    words = ["tune", "gs-c200", *RIG, "--moves", "60", "--variants", "64", "--into", str(program), "--json",
+             "--vary", "inertia=0.1,voltage=0.05,torque_constant=0,inductance=0,resistance=0,damping=0"]  # fmt: skip
+    found = json.loads(run(capsys, *words))
+    assert found["complete"]
+    assert [line[0] for line in found["commands"]] == ["S", "T", "R"]
+    assert found["check"]["variants"] == 64
+    assert (found["check"]["lost"], found["check"]["corners_lost"], found["check"]["corners"]) == (0, 0, 8)
+    (move,) = found["moves"]
+    assert move["steps"] == 60
+    assert move["bound_s"]["nominal"] <= move["bound_s"]["worst"] < move["time_s"] == found["time_s"]
+    assert program.read_text().split() == [*found["commands"], "+60"]
+    assert any("damping 0.12 (assumed" in word for word in found["assumed"])
+    assert not table.exists()
+    assert "over it with --overwrite" in run(capsys, *words, code=2)
+
+
+@pytest.mark.parametrize(
+    ("words", "remedy"),
+    [
+        (["tune", "gs-c200", "--moves", "100"], "--motor"),
+        (["tune", "gs-c200", *RIG, "--moves", "1.5"], "200,1000x3"),
+        (["tune", "gs-c200", *RIG, "--moves", "100", "--from", "x"], "--into"),
+        (["tune", "gs-c200", *RIG, "--moves", "100", "--map", "map.xyz"], "png"),
+        (["tune", "gs-c200", *RIG, "--moves", "100", "--set", "x"], "OPTION=VALUE"),
+        (["tune", "gs-c200", *RIG, "--moves", "100", "--travel", "9"], "--on PORT"),
+        (["tune", "gs-c200", *RIG, "--moves", "100", "--each-move", "--map", "a.png"], "--each-move"),
+        (["tune", "bs0610", *RIG, "--moves", "100", "--step", "half"], "step_size"),
+        (["tune", "gs-c2000", *RIG, "--moves", "100"], "gs-c200"),
+        (["compare-moves", "gs-c200", "S=48", *RIG, "--moves", "100"], "two to 6"),
+        (["compare-moves", "gs-c200", "S=48", "Q=1", *RIG, "--moves", "100"], "there are"),
+    ],
+)
+def test_what_was_asked_wrongly_is_told_with_the_remedy(
+    words: list[str], remedy: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert remedy in run(capsys, *words, code=2)
+
+
+def test_settings_are_compared_with_the_same_variants(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    picture = tmp_path / "compared.png"
+    words = ["compare-moves", "gs-c200", "S=48 T=603 R=201", "S=102 T=403 R=20", *RIG, "--moves", "200,400",
+             "--variants", "64"]  # fmt: skip
+    gentle, rough = json.loads(run(capsys, *words, "--json"))["settings"]
+    assert gentle["check"]["lost"] <= rough["check"]["lost"]
+    assert gentle["torque_used"] < rough["torque_used"]
+    assert gentle["moves"][1]["time_s"] > gentle["moves"][0]["time_s"]
+    assert "torque used" in run(capsys, *words, "--plot", str(picture))
+    assert picture.read_bytes().startswith(b"\x89PNG")
