@@ -16,9 +16,9 @@ from detent.motors.rotor import Floats, Rig
 from detent.motors.variants import Spread, changed
 
 SLOWEST = 100.0  # full steps/s, where the curve begins; below it torque is as there
-RATIO = 1.12  # from one point of the curve to the next
+RATIO = 1.2  # from one point of the curve to the next
 FINE_POINTS = 4000
-STARTED = 50  # full steps that a start must hold
+STARTED = 25  # full steps that a start must hold
 
 
 class Torque(NamedTuple):
