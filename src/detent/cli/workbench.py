@@ -40,6 +40,7 @@ def workbench(
     strap: Annotated[Sequence[str], Parameter(negative=())] = (),
     set_: Annotated[Sequence[str], Parameter(name="--set", negative=())] = (),
     state: Path | None = None,
+    real: Annotated[bool, Parameter(negative=())] = False,
     json: bool = False,
     unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:
@@ -86,6 +87,8 @@ def workbench(
         OPTION=VALUE, or UNIT.OPTION=VALUE for a cell.
     state
         Keep EEPROM images and drafts in this folder instead of $XDG_STATE_HOME/detent or ~/.local/state/detent.
+    real
+        Drive the pins of the boards in the cell file. Time then goes on, and one can only look back.
     json
         Print one line of JSON once everything is ready, and nothing else.
     unit
@@ -109,6 +112,8 @@ def workbench(
         need("workbench", "the workbench needs")
         if not (math.isfinite(pace) and pace > 0):
             raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
+        if real and (pace != 1 or hold):
+            raise Problem("", "--real", "real pins keep real time: leave out --pace and --hold")
         endpoints = asked_endpoints(links, tcp, rfc2217, serial)
         find(shown, straps=strap, options=set_)  # at once, not when everything is loaded
         written = _unit_options(target, at, unit)
@@ -147,7 +152,7 @@ def workbench(
         opening = asyncio.create_task(
             Bench.open(
                 shown, straps=strap, options=set_, wanted=endpoints, pace=pace, line_timing=line_timing,
-                state_dir=kept, held=hold,
+                state_dir=kept, held=hold, real=real,
             )
         )  # fmt: skip
         server = await asyncio.to_thread(import_module, "detent.workbench.server")  # seconds, while the cell starts

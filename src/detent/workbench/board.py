@@ -1,8 +1,7 @@
 """The state of a cell as the table that windows show (see `live`), and the deeds that windows may do to it.
 
-Keys: ``now begin end pace held why past faster late dropped marks crashed title queue faults
-branches``; for each unit
-``u.UNIT.`` and
+Keys: ``now begin end pace held why past faster late dropped marks crashed title queue faults branches``; of real pins
+``real`` (driven, fault, None) ``realwhy slips``; for each unit ``u.UNIT.`` and
 ``powered state address running error errorat hand reg unsaved stored memory pin.PIN x.AXIS.position|shaft|pulses|rate``
 (a single axis has no name: ``x..position``); for each switch ``s.SWITCH.`` and ``level low high``; for each motor
 ``m.MOTOR.`` and ``place command speed lost``; for each line ``l.LINE.format``. Times are in ns,
@@ -71,6 +70,9 @@ def table(state: State) -> dict[str, Value]:
         "breakerrors": state.break_on_errors,
         "branches": [list(branch) for branch in state.branches],
         "faults": [[number, text] for number, text in state.faults.items()],
+        "real": None if state.real is None else state.real.standing,
+        "realwhy": None if state.real is None else state.real.why,
+        "slips": None if state.real is None else state.real.slips,
     }
     for name, unit in state.units.items():
         _unit(values, f"u.{name}", unit)
@@ -196,10 +198,16 @@ def _offer(bench: "Bench", live: Live) -> None:
     async def restart() -> None:
         await bench.restart()
 
+    async def stop_motors() -> None:
+        await bench.stop_motors()
+
+    async def recover() -> None:
+        await bench.recover()
+
     async def revive() -> None:
         await bench.revive()
 
     for deed in (pace, faster, slower, step_instruction, step_back, rewind, power, set_switch, set_pin, set_strap,
                  place_switch, send, type, withdraw, start, break_on_errors, hold, go, step_event, breaks, mend,
-                 take_branch, compare_branch,                 restart, revive):  # fmt: skip
+                 take_branch, compare_branch, restart, stop_motors, recover, revive):  # fmt: skip
         live.offer(deed.__name__, deed)

@@ -82,14 +82,17 @@ class Bench:
         line_timing: bool = True,
         state_dir: Path | None = None,
         held: bool = False,
+        real: bool = False,
     ) -> "Bench":
         """Start the engine for `target`, a model or a cell file, and wait until it serves.
 
         `straps` and `options` are written as for `serve` (PIN=LEVEL or UNIT.PIN=LEVEL). `wanted`: endpoints, of every
-        line; none: what the cell file says, or a pty. `state_dir` keeps EEPROM images. Raises Problem if it was asked
+        line; none: what the cell file says, or a pty. `state_dir` keeps EEPROM images. `real` drives the
+        pins of its boards. Raises Problem if it was asked
         wrongly, BenchError if it failed.
         """
-        bench = cls(Order(target, tuple(straps), tuple(options), tuple(wanted), pace, line_timing, state_dir, held))
+        bench = cls(Order(target, tuple(straps), tuple(options), tuple(wanted), pace, line_timing, state_dir, held,
+                          real=real))  # fmt: skip
         try:
             await bench._start(bench._order)
         except BaseException:
@@ -421,6 +424,14 @@ class Bench:
     async def mend(self, number: int | None = None) -> None:
         """A fault is mended; all of them without a number."""
         await self._ask("mend", number)
+
+    async def stop_motors(self) -> None:
+        """Emergency stop: every board stops at once, and every axis stands until `recover`."""
+        await self._ask("stop_motors")
+
+    async def recover(self) -> None:
+        """Axes at fault go on from where their motors stand."""
+        await self._ask("recover")
 
     async def restart(self) -> None:
         """Begin anew from the cell file. Endpoints stay open if the lines are the same ones."""

@@ -29,7 +29,7 @@ from detent.realtime import breaking
 from detent.realtime.belonging import safe
 from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
 from detent.realtime.images import Images, ImagesUnusable, cell_name
-from detent.realtime.loop import BEHIND, Loop, ServedLine, stopped_by_signals, wake_exactly
+from detent.realtime.loop import BEHIND, Companion, Loop, ServedLine, stopped_by_signals, wake_exactly
 from detent.realtime.names import Names
 from detent.realtime.pace import Lateness as Counted
 from detent.realtime.pace import Pace, WallNs
@@ -51,6 +51,7 @@ from detent.workbench.messages import (
     Opened,
     Order,
     Picture,
+    RealState,
     State,
 )
 from detent.workbench.pipe import HEAD, Pipe, packed
@@ -76,6 +77,7 @@ class Engine:
             self._images = self._open_images(found.description)
             if self._images is not None:
                 opening.callback(self._images.close)
+            self._opening = opening
             cell = self._begin(found)
             self._opened = open_endpoints(
                 found.description,
@@ -87,11 +89,11 @@ class Engine:
             )
             self._pipe = Pipe(end, self._heed, self._tick, lambda: self._loop.stop())
             opening.callback(self._pipe.close)
-            self._pace = Pace(order.pace or 1, origin=0)
+            self._pace = self._made_pace()
             self._set_pace(order.pace)
             endpoints: list[tuple[int, Endpoint]] = [(0, self._pipe), *self._opened]  # what is asked comes first
             patience = [line.format.duration(BEHIND) for line in cell.lines]
-            self._loop = Loop(self, self._pace, endpoints, patience=patience)
+            self._loop = Loop(self, self._pace, endpoints, patience=patience, companion=self._companion())
             opening.callback(self._loop.close)
             self._again()
             if order.held or order.deeds:
@@ -143,6 +145,17 @@ class Engine:
             with contextlib.suppress(*WRONG):  # as it was then
                 self.history.do(action.deed)
         self.history.run_to(self._order.until)
+
+    def _made_pace(self) -> Pace:
+        return Pace(self._order.pace or 1, origin=0)
+
+    def _companion(self) -> Companion | None:
+        """What is served beside the cell."""
+        return None
+
+    def _real_state(self) -> RealState | None:
+        """How real pins stand."""
+        return None
 
     def _picture(self) -> Picture:
         description = self._found.description
@@ -263,6 +276,7 @@ class Engine:
             speaking={name: line.host_busy_until for name, line in self._named_lines()},
             dropped=sum(endpoint.dropped for _, endpoint in self._opened),
             faster=self._faster,
+            real=self._real_state(),
         )
 
     def _named_lines(self) -> list[tuple[str, Line]]:
@@ -478,6 +492,14 @@ class Engine:
     } | {"pace": _set_pace}  # fmt: skip
 
 
+def _engine(end: socket.socket, order: Order) -> Engine:
+    if not order.real:
+        return Engine(end, order)
+    from detent.workbench.driven import DrivenEngine
+
+    return DrivenEngine(end, order)
+
+
 def _read_order(end: socket.socket) -> Order | None:
     """The first message; None if there is none."""
     head = end.recv(HEAD.size, socket.MSG_WAITALL)
@@ -495,7 +517,7 @@ def main(descriptor: int) -> int:
     if order is None:
         return 0
     try:
-        with Engine(end, order) as engine:
+        with _engine(end, order) as engine:
             try:
                 engine.run()
             except Exception as error:

@@ -202,6 +202,15 @@ class Lateness(NamedTuple):
     worst: int
 
 
+class RealState(NamedTuple):
+    """How real pins stand that are driven."""
+
+    standing: str  # driven, or fault: an axis stands until somebody says recover
+    why: str  # of the fault
+    slips: int
+    stops: int  # by the firmware, so far
+
+
 class State(NamedTuple):
     """The cell now."""
 
@@ -224,6 +233,7 @@ class State(NamedTuple):
     speaking: Mapping[str, Ns]  # when the host of each line has said everything that it was given
     dropped: int  # bytes that hosts did not read
     faster: float  # cell time per wall time, measured over the last second
+    real: RealState | None = None  # of boards that are driven
 
     @property
     def past(self) -> bool:
@@ -250,6 +260,7 @@ class Order(NamedTuple):
     deeds: tuple[Action, ...] = ()  # to be done first, each at its time: those of an engine that is gone
     until: Ns = 0  # as far as it had come
     placed: Mapping[str, tuple[Wanted, ...]] = {}  # where its lines were served, by name
+    real: bool = False  # drive the pins of the boards in the cell file
 
 
 class Ask(NamedTuple):

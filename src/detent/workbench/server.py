@@ -44,7 +44,15 @@ def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place, st
     for an address that needs a token.
     """
     live = Live()
-    units = Units(live, Stopping(live), folder, state)
+    stopping = Stopping(live)
+    if bench.state.real is not None:
+
+        async def stop_boards() -> str:
+            await bench.stop_motors()
+            return "every board has stopped, and its axes stand until somebody says Recover"
+
+        stopping.add("boards", stop_boards)
+    units = Units(live, stopping, folder, state)
     site = FastAPI(title="Detent", docs_url=None, redoc_url=None, openapi_url=None)
     guard = Guard(site, place.host, place.token, names_of_this_machine())
     Board(bench, live)

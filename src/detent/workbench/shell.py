@@ -61,7 +61,7 @@ def _top(title: str, pages: Sequence[Page]) -> str:
   <nav class="tabs" data-part="tabs" aria-label="Pages">{tabs}</nav>
   <span class="tools">
     <button class="key stop" data-part="stop" hidden
-      data-help="Stop every unit that is connected (Esc twice); again: at once">STOP</button>
+      data-help="Stop every unit that is connected, and every board (Esc twice); again: at once">STOP</button>
     <span class="others" data-level="windows" data-help="Windows that show this cell"><b data-live="windows"></b>
       windows</span>
     <button class="key bare" data-part="restart" aria-label="Begin anew"
@@ -77,6 +77,8 @@ def _top(title: str, pages: Sequence[Page]) -> str:
 <ul></ul><div class="row"><span class="grow"></span><button class="key" data-close>Close</button></div></dialog>
 <div class="alarm" role="alert" data-part="alarm"><span data-live="crashed"></span>
   <button class="key small primary" data-do="revive">Start the cell again</button></div>
+<div class="alarm halted" role="alert"><span data-live="realwhy"></span>
+  <button class="key small primary" data-do="recover" data-help="Look at the machine first">Recover</button></div>
 <div class="alarm link" role="alert">No connection to the workbench. Trying again …</div>"""
 
 

@@ -33,7 +33,7 @@ class Waiting:
 
     async def type(self, unit: str, text: str) -> None:
         """Send a unit a command line, or keep it until time goes on. Raises what the bench does."""
-        if not self._bench.state.held:
+        if self._sends_now():
             await self._bench.type(unit, text)
             return
         line = self._bench.picture.units[unit].line
@@ -45,12 +45,17 @@ class Waiting:
 
     async def send(self, line: str, data: bytes) -> None:
         """Send bytes to a line, or keep them until time goes on."""
-        if not self._bench.state.held:
+        if self._sends_now():
             await self._bench.send(line, data)
             return
         if line not in self._bench.picture.lines:
             raise ValueError(f"there is no line {line!r}")
         self._put(line, None, data.decode("latin-1"))
+
+    def _sends_now(self) -> bool:
+        """A machine's time always goes on: what is typed while somebody looks back must not move it later."""
+        state = self._bench.state
+        return not state.held or state.real is not None
 
     def withdraw(self, number: int | None) -> None:
         """Take one of them back, or all."""

@@ -90,6 +90,7 @@ class Leaving:
         self._stages: dict[str, Stage] = {}
         self._halved: dict[str, bool] = {}  # whether a plain driver is told to give half of its current
         self.on_moving: Callable[[bool], None] = lambda moving: None  # something begins to move, or all is at rest
+        self.on_taken_back: Callable[[Ns], None] = lambda at: None  # what the cell did behind `at` did not happen
         self._was_moving = False
         self.abandoned = False  # the cell cannot go on, and so nothing is done for it any more
         self.escaped = 0  # characters that hosts heard though they were taken back

@@ -84,6 +84,7 @@ class TakingBack(Leaving):
         self, stopped: Axle, at: Ns, deeds: Sequence[Deed], drop: Callable[[Action], bool], shaft: int
     ) -> None:
         """The cell lives on from `at`, where `deeds` are done; tell the boards only what is different."""
+        self.on_taken_back(at)
         motions: dict[str, list[Motion]] = {}
         levels: dict[str, list[tuple[Ns, bool]]] = {}
         counts: list[int] = []

@@ -436,6 +436,9 @@ applyTheme();
 listenForHelp();
 listenForDeeds();
 followTabs();
+on("real", (key, value) => {
+  if (key === "real") document.documentElement.dataset.real = value ?? "";
+});
 on("crashed", (key, value) => (document.documentElement.dataset.crashed = value ? "yes" : ""));
 on("title", (key, value) => {
   document.documentElement.dataset.title = value;

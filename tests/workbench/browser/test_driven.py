@@ -1,0 +1,86 @@
+"""A cell that drives pins, in a real browser: live panels, a look back, STOP on every page, recovery."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from tests.workbench.browser.windows import PHONE, WIDE, Served, Window, Windows
+
+CELL = """
+title = "A slide on real pins"
+[units.x]
+model = "gs-c200"
+straps = { CHS = "low" }
+[boards.b]
+serial = "fake:rp2040"
+[hardware.x]
+board = "b"
+step = "!gpio2"
+dir = "gpio3"
+enable = "!gpio4"
+inputs = { EOT = "^gpio10", HOME = "^gpio11" }
+"""
+PAGES = ("/", "/program", "/terminal", "/scope", "/motion")
+STOP = "STOP"
+
+
+@pytest.fixture
+def driven(chromium: Any, serve: Callable[..., Served], tmp_path_factory: pytest.TempPathFactory) -> Served:
+    place = tmp_path_factory.getbasetemp() / "driven-cell.toml"
+    place.write_text(CELL)
+    return serve(str(place), "--real", "--tcp", "127.0.0.1:0")
+
+
+def opened(windows: Windows, served: Served, size: tuple[int, int] = WIDE) -> Window:
+    window = windows.new(served, size=size, theme="light").open()
+    if window.get("real") == "fault":
+        window.call("recover")
+    window.until("() => detent.get('real') === 'driven'")
+    return window
+
+
+def test_stop_stands_on_every_page_and_recover_goes_on(windows: Windows, driven: Served) -> None:
+    window = opened(windows, driven)
+    for path in PAGES:
+        window.open(path)
+        window.page.get_by_role("button", name=STOP, exact=True).wait_for()
+    window.open("/")
+    window.call("type", "x", "+30000")
+    window.until("() => detent.get('u.x.x..rate') > 0")
+    window.picture("driven-wide-light")
+    window.page.get_by_role("button", name=STOP, exact=True).click()
+    window.until("() => detent.get('real') === 'fault'")
+    window.page.get_by_text("x: emergency stop").wait_for()
+    window.until("() => detent.get('u.x.x..rate') === 0")
+    window.picture("driven-stopped-wide-light")
+    window.page.get_by_role("button", name="Recover").click()
+    window.until("() => detent.get('real') === 'driven'")
+    window.until("() => detent.get('marks').some(([at, kind, unit, text]) => text.includes('goes on at'))")
+
+
+def test_one_looks_back_and_the_machine_goes_on(windows: Windows, driven: Served) -> None:
+    window = opened(windows, driven)
+    window.until("() => detent.get('end') > 5e8")
+    before = window.get("end")
+    window.call("rewind", before // 2)
+    window.until("() => detent.get('past')")
+    for name, arguments in (("type", ["x", "+10"]), ("restart", []), ("pace", [2])):
+        error = window.page.evaluate(
+            "([name, args]) => detent.call(name, ...args).then(() => '', (error) => String(error.message ?? error))",
+            [name, arguments],
+        )
+        assert "looking back" in error or "real pins are driven" in error
+    window.call("go")
+    window.until("(before) => !detent.get('past') && detent.get('end') > before", before)
+
+
+def test_it_fits_a_phone(windows: Windows, driven: Served) -> None:
+    window = opened(windows, driven, PHONE)
+    window.page.get_by_role("button", name=STOP, exact=True).wait_for()
+    assert window.page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+    window.picture("driven-phone-light")
+
+
+def test_without_real_pins_there_is_no_stop(window: Window) -> None:
+    assert window.get("real") is None
+    assert not window.page.get_by_role("button", name=STOP, exact=True).is_visible()

@@ -1,0 +1,94 @@
+"""A cell behind real pins (a fake board) in the process of the workbench: what windows see, do, and may not do."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+
+from detent.cell.description import Problem
+from detent.realtime.endpoints.wanted import Wanted
+from detent.workbench.client import Bench, BenchError
+
+PATIENCE = 60  # seconds, when something is broken
+CELL = """
+[units.x]
+model = "gs-c200"
+straps = { CHS = "low" }
+[boards.b]
+serial = "fake:rp2040"
+[hardware.x]
+board = "b"
+step = "!gpio2"
+dir = "gpio3"
+inputs = { EOT = "^gpio10", HOME = "^gpio11" }
+"""
+
+
+def play(scene: Callable[[Bench], Awaitable[None]], tmp_path: Path, text: str = CELL) -> None:
+    async def whole() -> None:
+        cell = tmp_path / "cell.toml"
+        cell.write_text(text)
+        bench = await Bench.open(str(cell), real=True, wanted=[Wanted("tcp", "127.0.0.1:0")], line_timing=False)
+        try:
+            await asyncio.wait_for(scene(bench), PATIENCE)
+        finally:
+            await bench.close()
+
+    asyncio.run(whole())
+
+
+def position(bench: Bench) -> int:
+    return bench.state.units["x"].axes[""].position
+
+
+def test_windows_see_what_the_machine_does_and_look_back_while_it_goes_on(tmp_path: Path) -> None:
+    async def scene(bench: Bench) -> None:
+        await bench.type("x", "+300")
+        state = await bench.until(lambda _: position(bench) == 300)
+        assert state.real is not None
+        assert state.real.standing == "driven"
+        await bench.rewind(state.now // 2)
+        state = await bench.until(lambda state: state.past)
+        assert state.stopped_why == "looking back; the machine goes on"
+        assert 0 < position(bench) < 300
+        for refused in (bench.type("x", "+3"), bench.restart(), bench.pace(2), bench.run_to("x", 0),
+                        bench.set_breakpoints("x", [3]), bench.break_on_errors(True)):  # fmt: skip
+            with pytest.raises(BenchError, match=r"looking back|real pins are driven"):
+                await refused
+        await bench.go()
+        await bench.type("x", "-100")
+        await bench.until(lambda _: position(bench) == 200)
+        with pytest.raises(BenchError, match="its level is that of the pin"):
+            await bench.set_pin("x", "EOT", 0)
+        assert bench.state.units["x"].held_pins == frozenset()
+
+    play(scene, tmp_path)
+
+
+def test_stop_and_recover(tmp_path: Path) -> None:
+    async def scene(bench: Bench) -> None:
+        await bench.type("x", "+30000")
+        await bench.until(lambda _: position(bench) > 100)
+        await bench.stop_motors()
+        state = await bench.until(lambda state: state.real is not None and state.real.standing == "fault")
+        assert state.real is not None
+        assert state.real.why == "x: emergency stop"
+        await bench.recover()
+        await bench.until(lambda state: any("goes on at" in mark.text for mark in state.marks))
+        told = next(mark.text for mark in bench.state.marks if "goes on at" in mark.text)
+        counted = int(told.split(" goes on at ")[1].split(",")[0])
+        await bench.until(lambda _: position(bench) == counted)  # the view comes to where the board has counted
+        await bench.type("x", "-50")
+        await bench.until(lambda _: position(bench) == counted - 50)
+        assert bench.crashed is None
+
+    play(scene, tmp_path)
+
+
+def test_a_board_that_is_not_there_is_said_as_by_serve(tmp_path: Path) -> None:
+    async def scene(_: Bench) -> None:
+        raise AssertionError("it was opened")
+
+    with pytest.raises(Problem, match=r"boards\.b\.serial: .*plug it in"):
+        play(scene, tmp_path, CELL.replace("fake:rp2040", "/dev/serial/by-id/usb-Klipper_x"))
