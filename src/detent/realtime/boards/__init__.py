@@ -22,6 +22,7 @@ the wall clock and give bytes, so the same code runs against the fake board in v
 | `driven` | the cell behind its pins, as the loop serves it; made of the three that follow |
 | `leaving` | what the cell does, on its way out: `channels`, `axle`; who watches (`guard`), what waits (`replies`) |
 | `taking_back` | a stop takes the cell back (`past`), and the boards are told what is different |
+| `stages`, `checking` | what each power stage is told at first; a look at the wiring: inputs live, axes jogged |
 | `mishaps` | faults, emergency stop, recovery; `states` is how all of it stands, for those who look |
 
 **Time.** `wall` is always the host's monotonic clock in ns. Cell time is the board's time: `Boards.now` gives its
