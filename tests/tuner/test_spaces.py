@@ -96,7 +96,7 @@ def test_a_coarser_microstep_makes_the_same_way_with_fewer_steps() -> None:
 def test_settings_by_hand_are_settings_and_longer_ramps_take_longer(model: str) -> None:
     judge = usual(model)
     hand = judge.space.hand
-    longer = judge.space.slower(hand, 2)
+    longer = judge.space.slower(hand, 1.25)
     fast, slow = judge.time(hand), judge.time(longer)
     assert fast is not None
     assert slow is not None
@@ -129,7 +129,7 @@ def test_settings_go_into_a_program_a_backup_and_a_cell() -> None:
         put_into("S10\nT100\n+1000\n", profile)
     assert program(made, profile).splitlines() == ["S48", "T603", "R201", "+192", "+960"]
     sigma = task("supersigma")
-    table = usual("supersigma").trains((300, 5000, 700))
+    table = usual("supersigma").trains(usual("supersigma").space.hand)
     assert table is not None
     cell = 'options = { table = "4000:2580:0102", short = "hyperbola" }'
     assert put_into(cell, table[0]).text == (f'options = {{ table = "{table[0].options["table"]}", short = "exact" }}')
