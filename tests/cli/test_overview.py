@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from detent.cli import TITLE, VERBS, application, overview
+from detent.cli import COMPLETION, TITLE, VERBS, application, overview
 
 
 @pytest.mark.parametrize("columns", [72, 80, 99, 100, 133, 200])
@@ -18,7 +18,7 @@ def test_it_is_what_cyclopts_prints(columns: int, colour: bool, monkeypatch: pyt
     console = Console(file=printed, width=columns, force_terminal=colour, color_system=system, legacy_windows=False)
     application()(["--help"], console=console, exit_on_error=False, result_action="return_zero")
     verbs = [(name, line) for name, (_, line) in VERBS.items()]
-    quick = overview.text(TITLE, verbs, columns, colour=colour)
+    quick = overview.text(TITLE, verbs, COMPLETION, columns, colour=colour)
     assert [line.rstrip() for line in quick.splitlines()] == [line.rstrip() for line in printed.getvalue().splitlines()]
 
 

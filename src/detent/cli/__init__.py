@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from cyclopts import App
 
 TITLE = "Intelligent stepper motor controllers in software, exact to the pulse."
+COMPLETION = "Write the script that completes detent in your shell."
 FAILED = 1
 ASKED_WRONGLY = 2
 
@@ -66,8 +67,7 @@ def application(asked: str = "") -> "App":
         # A help text given here would replace the function's own, which the verb's --help shows whole.
         short = {} if asked in (name, "*") else {"help": line}
         app.command(function, name=name, sort_key=place, **short)
-    line = "Write the script that completes detent in your shell."
-    app.command("detent.cli.completing:install", name="--install-completion", help=line)
+    app.command("detent.cli.completing:install", name="--install-completion", help=COMPLETION)
     return app
 
 
@@ -85,7 +85,7 @@ def main(tokens: Sequence[str] | None = None) -> None:
     given = list(sys.argv[1:] if tokens is None else tokens)
     if overview.wanted(given):
         try:
-            overview.show(TITLE, [(name, line) for name, (_, line) in VERBS.items()])
+            overview.show(TITLE, [(name, line) for name, (_, line) in VERBS.items()], COMPLETION)
         except BrokenPipeError:
             _nobody_reads()
         sys.exit(0)

@@ -20,17 +20,17 @@ def wanted(tokens: Sequence[str]) -> bool:
     return (sys.stdout.encoding or "").lower().startswith("utf") and _columns() >= _NARROWEST
 
 
-def show(title: str, verbs: Sequence[tuple[str, str]]) -> None:
-    """Print it: what the command is, and each verb with its line of help."""
-    print(text(title, verbs, _columns(), colour=sys.stdout.isatty()))
+def show(title: str, verbs: Sequence[tuple[str, str]], completion: str) -> None:
+    """Print it: what the command is, each verb with its line of help, and the line of the completion of shells."""
+    print(text(title, verbs, completion, _columns(), colour=sys.stdout.isatty()))
 
 
-def text(title: str, verbs: Sequence[tuple[str, str]], columns: int, *, colour: bool) -> str:
+def text(title: str, verbs: Sequence[tuple[str, str]], completion: str, columns: int, *, colour: bool) -> str:
     """The whole, for so many columns."""
     rows = [
         *verbs,
         ("--help (-h)", "Display this message and exit."),
-        ("--install-completion", "Install shell completion for this application."),
+        ("--install-completion", completion),
         ("--version", "Display application version."),
     ]
     left = max(len(name) for name, _ in rows)
