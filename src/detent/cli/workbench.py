@@ -39,6 +39,7 @@ def workbench(
     line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
     strap: Annotated[Sequence[str], Parameter(negative=())] = (),
     set_: Annotated[Sequence[str], Parameter(name="--set", negative=())] = (),
+    memory: int = 512,
     state: Path | None = None,
     real: Annotated[bool, Parameter(negative=())] = False,
     json: bool = False,
@@ -85,6 +86,8 @@ def workbench(
         PIN=LEVEL (low, high, open), or UNIT.PIN=LEVEL for a cell.
     set_
         OPTION=VALUE, or UNIT.OPTION=VALUE for a cell.
+    memory
+        So many MB, about, the past may take; what is older is dropped, and the time line then begins later.
     state
         Keep EEPROM images and drafts in this folder instead of $XDG_STATE_HOME/detent or ~/.local/state/detent.
     real
@@ -114,6 +117,8 @@ def workbench(
             raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
         if real and (pace != 1 or hold):
             raise Problem("", "--real", "real pins keep real time: leave out --pace and --hold")
+        if memory < 256:
+            raise Problem("", "--memory", f"{memory} MB are too few; it takes at least 256")
         endpoints = asked_endpoints(links, tcp, rfc2217, serial)
         find(shown, straps=strap, options=set_)  # at once, not when everything is loaded
         written = _unit_options(target, at, unit)
@@ -152,7 +157,7 @@ def workbench(
         opening = asyncio.create_task(
             Bench.open(
                 shown, straps=strap, options=set_, wanted=endpoints, pace=pace, line_timing=line_timing,
-                state_dir=kept, held=hold, real=real,
+                state_dir=kept, held=hold, real=real, memory=memory,
             )
         )  # fmt: skip
         server = await asyncio.to_thread(import_module, "detent.workbench.server")  # seconds, while the cell starts

@@ -83,16 +83,17 @@ class Bench:
         state_dir: Path | None = None,
         held: bool = False,
         real: bool = False,
+        memory: int = 512,
     ) -> "Bench":
         """Start the engine for `target`, a model or a cell file, and wait until it serves.
 
         `straps` and `options` are written as for `serve` (PIN=LEVEL or UNIT.PIN=LEVEL). `wanted`: endpoints, of every
-        line; none: what the cell file says, or a pty. `state_dir` keeps EEPROM images. `real` drives the
-        pins of its boards. Raises Problem if it was asked
+        line; none: what the cell file says, or a pty. `state_dir` keeps EEPROM images. `real` drives the pins of its
+        boards. The past that is kept takes about `memory` MB; what is older is dropped. Raises Problem if it was asked
         wrongly, BenchError if it failed.
         """
-        bench = cls(Order(target, tuple(straps), tuple(options), tuple(wanted), pace, line_timing, state_dir, held,
-                          real=real))  # fmt: skip
+        order = Order(target, tuple(straps), tuple(options), tuple(wanted), pace, line_timing, state_dir, held)
+        bench = cls(order._replace(memory=memory, real=real))
         try:
             await bench._start(bench._order)
         except BaseException:
@@ -450,6 +451,9 @@ class Bench:
         deeds, until = (tuple(mirror.deeds), end) if mirror.complete else (tuple(mirror.loaded.values()), 0)
         self._asked.clear()
         placed = {name: tuple(map(_again, line.endpoints)) for name, line in self.picture.lines.items()}
+        for wanted in (one for several in placed.values() for one in several):
+            if wanted.kind == "pty" and wanted.where and Path(wanted.where).is_symlink():
+                Path(wanted.where).unlink()  # of the one that is gone; its terminal may be another's by now
         await self._start(self._order._replace(deeds=deeds, until=until, held=True, placed=placed))
         self.crashed = None
         self._call_back()

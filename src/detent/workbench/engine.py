@@ -11,7 +11,7 @@ import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Final
 
 from detent.assembler import ImageError
 from detent.cell.cell import Cell
@@ -54,10 +54,19 @@ from detent.workbench.messages import (
     RealState,
     State,
 )
+from detent.workbench.mirror import SLACK
 from detent.workbench.pipe import HEAD, Pipe, packed
 
+BASE: Final = 210  # MB of both processes before anything has happened
+BATCH: Final = 480  # bytes that a batch of the recording takes, measured on the drilling cell
+LEAST_KEPT: Final = 20_000  # batches, however little memory there may be
 BY_HAND = "by hand"
 WRONG = (Problem, Broken, ImageError, ValueError, KeyError, TypeError)  # of whoever asks
+
+
+def keep(memory: int) -> int:
+    """How many batches of the past can be gone back over in so many MB of engine and pages together."""
+    return max(int((memory - BASE) * 1e6 / (BATCH * (1 + 1 / SLACK))), LEAST_KEPT)
 
 
 class Engine:
@@ -116,7 +125,10 @@ class Engine:
         """Where a host finds a line by the same name at each start: beside what is kept of the cell."""
         folder, is_file = self._order.state_dir, bool(self._found.description.file)
         assert folder is not None
-        return folder / "ports" / f"{cell_name(self._order.target, is_file=is_file)}-{safe(line)}"
+        link = folder / "ports" / f"{cell_name(self._order.target, is_file=is_file)}-{safe(line)}"
+        if self._images is not None and link.is_symlink():
+            link.unlink()  # the cell is ours alone, so it was left behind; its terminal may be another's by now
+        return link
 
     def _begin(self, found: Target) -> Cell:
         """A new cell, with nothing behind it."""
@@ -128,7 +140,7 @@ class Engine:
             found.description, found.read, self._images, line_timing, self._reports, True, self._stores.save
         )
         shafts = {name: unit.shaft for name, unit in found.description.units.items()}
-        self.history = History(cell, self._stores, shafts=shafts, on_stop=self._stopped)
+        self.history = History(cell, self._stores, shafts=shafts, on_stop=self._stopped, keep=keep(self._order.memory))
         self.history.on_notable = self._mark_entry
         for part in self.history.motors:
             rotors.prepare(cell, part)

@@ -37,6 +37,9 @@ from detent.workbench.messages import (
     WirePicture,
 )
 
+BLIND = ("supersigma",)
+"""Models that count no position: what is shown is where their pulses have taken the shaft."""
+
 
 def picture(
     description: Description,
@@ -164,7 +167,8 @@ def _state(controller: Controller | None, front: Front, now: Ns, held: frozenset
     axes = {}
     for axis, travel in front.travels.items():
         status, (shaft, rate) = controller.status(now, axis), travel.at(now)
-        axes[axis] = AxisState(status.position, shaft, status.pulses, rate)
+        position = status.position if controller.model not in BLIND else shaft
+        axes[axis] = AxisState(position, shaft, status.pulses, rate)
     state = controller.status(now).state
     executing = front.executing if state not in ("ready", "waiting", "programming", "off") else None
     straps = controller.straps

@@ -259,6 +259,7 @@ class Order(NamedTuple):
     held: bool
     deeds: tuple[Action, ...] = ()  # to be done first, each at its time: those of an engine that is gone
     until: Ns = 0  # as far as it had come
+    memory: int = 512  # MB, about, that everything may take: what is older than fits is dropped
     placed: Mapping[str, tuple[Wanted, ...]] = {}  # where its lines were served, by name
     real: bool = False  # drive the pins of the boards in the cell file
 

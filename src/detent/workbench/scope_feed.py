@@ -191,7 +191,7 @@ class Feed:
         self._traces = {trace.key: trace for trace in bench.traces}
         rows = [
             {
-                "id": trace.key, "unit": trace.unit, "name": trace.name, "title": trace.help, "units": trace.measure,
+                "id": trace.key, "unit": owner(trace), "name": trace.name, "title": trace.help, "units": trace.measure,
                 "level": trace.digital, "shape": shape(trace), "lane": lane(trace),
             }
             for trace in bench.traces
@@ -257,6 +257,11 @@ class Feed:
         kinds = PIN_KINDS[wanted.edge] if trace.digital else CURVE_KINDS[wanted.edge]
         triggers = (Trigger(kind, wanted.source, wanted.level) for kind in kinds)
         return sorted({at for trigger in triggers for at in self._bench.search(trigger, begin, end, most)})
+
+
+def owner(trace: Trace) -> str:
+    """Whose it is, in words: of two motors of a unit each has a name of its own."""
+    return trace.unit if trace.digital else trace.key.rpartition(".")[0]
 
 
 def shape(trace: Trace) -> str:

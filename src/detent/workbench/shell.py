@@ -106,6 +106,8 @@ def _bottom() -> str:
     <span class="why" data-live="why" data-level="past" aria-live="polite"></span>
     <span class="pulse" data-help="How late events of the cell are served, 99 of 100 at most; how fast it really runs">
       <span class="dropped" data-level="dropped"><b data-live="dropped"></b> bytes lost</span>
+      <span class="gone" data-level="begin" data-help="What was before is dropped: --memory says how much is kept">kept
+      from <b class="num" data-live="begin" data-form="time"></b> s</span>
       late <b class="num" data-live="late" data-form="fixed"></b> ms
       <b class="num" data-live="faster" data-form="pace"></b></span>
     <output class="clock" aria-label="Time of the cell">

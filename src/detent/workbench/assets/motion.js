@@ -112,12 +112,15 @@ class Motion {
       "aria-label": `${row.title}, ${row.unit}`,
       "data-exact": row.name,
     });
+    const limit = element("small", { class: "motion-limit", role: "status" });
     const show = () => {
+      limit.textContent = "";
       range.value = notch(row.get());
       if (document.activeElement !== exact) exact.value = row.get() * row.scale;
       range.setAttribute("aria-valuetext", `${row.get() * row.scale} ${row.unit}`);
     };
     range.addEventListener("input", () => {
+      limit.textContent = "";
       row.set(value(Number(range.value)));
       exact.value = row.get() * row.scale;
       this.changed();
@@ -135,6 +138,10 @@ class Motion {
       const wanted = Math.round(Number(exact.value) / row.scale);
       if (!exact.value || !Number.isFinite(wanted)) return;
       row.set(Math.min(Math.max(wanted, row.low), row.high));
+      limit.textContent =
+        row.get() === wanted
+          ? ""
+          : `takes ${row.low * row.scale} to ${row.high * row.scale} ${row.unit}: ${row.get() * row.scale} is meant`;
       range.value = notch(row.get());
       this.changed();
     });
@@ -152,6 +159,7 @@ class Motion {
       ),
       element("span", { class: "motion-exact" }, exact, element("small", {}, row.unit)),
       range,
+      limit,
     );
     show();
     return { ...row, place, show };

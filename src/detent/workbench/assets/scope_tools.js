@@ -263,9 +263,8 @@ export class Tools {
                 element("b", {}, trace.unit),
                 " ",
                 trace.name,
-                element("small", {}, trace.level ? "" : trace.units),
               ),
-              element("span", { class: "mono scope-value" }),
+              element("span", { class: "mono scope-value", "data-units": trace.level ? "" : trace.units }),
               element(
                 "button",
                 {

@@ -3,11 +3,11 @@
 const { part, remember, remembered } = window.detent;
 
 const STOPS = [
-  ["", "Welcome to the workbench", "A cell of controllers, running now. Everything here is live, and everything can be taken back. Six short stops."],
+  ["", "Welcome to the workbench", "A cell of controllers, as they stand now: running, ready, or waiting to be spoken to. Everything here is live, and everything can be taken back. Six short stops."],
   [".unit .panel-head", "Every unit is a front panel", "Its power switch, its state, its position and rate, the instruction it is at, the last error. Lamps are the levels of its pins; hover over anything for what it is."],
   [".panel-switches, .toggle, button.pin", "Switches, inputs, wires", "Click a switch, an input pin or a strap to change it. Lines are the wires of the cell: green carries a 1."],
   [".transport", "Time obeys you", "Pause, go on by single events, and run from a thousandth of real time to as fast as it goes. Keys: space, comma and point, [ and ]."],
-  [".history", "Drag back", "The whole past is kept. Drag the time line back, and the cell is as it was then; press go, and it goes on from there."],
+  [".history", "Drag back", "The whole past is kept. Drag the time line back, and the cell is as it was then; press go, and it goes on from there. What had come after is kept as another future."],
   ["nav.tabs", "And further", "Program: write, load and step a stored program. Terminal: every byte on the lines, explained. Scope and Motion: what the axes do, exact to the pulse."],
 ];
 

@@ -212,16 +212,13 @@ def _other_end(picture: Picture, end: str) -> str:
 
 
 def _pins(unit: UnitPicture, jacks: set[str]) -> str:
-    """Inputs on the left, outputs on the right, each with its jack at the edge; free inputs fill up the right."""
+    """Inputs on the left, outputs on the right, each with its jack at the edge."""
     inputs = [pin for pin in unit.pins if pin.kind == "input"]
     outputs = [pin for pin in unit.pins if pin.kind in DRIVES and (pin.kind != "winding" or pin.wired)]
-    free = [pin for pin in inputs if f"{unit.name}.{pin.name}" not in jacks]
-    moved = free[len(free) - max(0, min(len(free), (len(inputs) - len(outputs)) // 2)) :]
-    kept = [pin for pin in inputs if pin not in moved]
     if not inputs and not outputs:
         return ""
-    left = "".join(_pin(unit, pin, "left", f"{unit.name}.{pin.name}" in jacks) for pin in kept)
-    right = "".join(_pin(unit, pin, "right", f"{unit.name}.{pin.name}" in jacks) for pin in (*outputs, *moved))
+    left = "".join(_pin(unit, pin, "left", f"{unit.name}.{pin.name}" in jacks) for pin in inputs)
+    right = "".join(_pin(unit, pin, "right", f"{unit.name}.{pin.name}" in jacks) for pin in outputs)
     registers = f'<dl class="registers" data-part="registers" data-key="u.{escape(unit.name)}.reg"></dl>'
     return f"""<div class="pins"><div class="side">{left}</div><div class="side">{right}</div>
 {registers if unit.axes else ""}</div>"""
