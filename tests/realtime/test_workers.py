@@ -76,3 +76,31 @@ def test_nobody_at_the_address() -> None:
 
     with pytest.raises(WorkersLost, match=r"--scheduler tcp://127.0.0.1:1: nobody answers"):
         Workers(scheduler="tcp://127.0.0.1:1", patience=1)
+
+
+def test_the_tuner_gives_the_same_answer_and_map(workers: Any) -> None:
+    from detent.tuner.map import loss_map
+    from detent.tuner.search import search
+    from detent.tuner.task import Task, moves_of
+
+    task = Task("gs-c200", RIG, moves_of("200"), at_corners=False, screened=64, final=64, refined=False)
+    alone = search(task)
+    divided = search(task, run=workers.run, ahead=8)
+    assert (divided.point, divided.check, divided.times) == (alone.point, alone.check, alone.times)
+    one = loss_map(task, alone.point, columns=6, rows=5, variants=16)
+    many = loss_map(task, alone.point, columns=6, rows=5, variants=16, run=workers.run, together=30)
+    assert one.csv() == many.csv()
+
+
+def test_a_batch_has_the_same_rows(workers: Any) -> None:
+    from dataclasses import replace
+
+    from detent.tuner.batch import answers
+    from detent.tuner.task import Task, moves_of
+
+    rigs = [RIG, replace(RIG, load=Load(inertia=3e-5, friction=0.02)), replace(RIG, load=Load(friction=3.0))]
+    tasks = [Task("gs-c200", rig, moves_of("200"), at_corners=False, screened=16, final=32, refined=False)
+             for rig in rigs]  # fmt: skip
+    alone = answers(None, tasks)
+    assert [bool(answer.problem) for answer in alone] == [False, False, True]
+    assert list(workers.map(answers, None, tasks, chunk=1)) == alone

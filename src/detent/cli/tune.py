@@ -25,7 +25,7 @@ def tune(
     model: str,
     *,
     motor: str | None = None,
-    moves: str,
+    moves: str | None = None,
     machine: Machine = NO_MACHINE,
     rig: Options = RigOptions(),  # noqa: B008 (never changes)
     set_: Annotated[list[str] | None, Parameter(name="--set")] = None,
@@ -39,6 +39,10 @@ def tune(
     into: Path | None = None,
     from_: Annotated[Path | None, Parameter(name="--from")] = None,
     overwrite: bool = False,
+    batch: Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    gpu: bool = False,
     json: bool = False,
 ) -> None:
     """Find the fastest settings with which a motor and its load lose no step.
@@ -81,6 +85,15 @@ def tune(
         A program, a backup or a cell file that sets such settings; it is left as it is.
     overwrite
         Write over files that are there.
+    batch
+        A CSV file with a row for each machine; its columns are options like motor, supply, inertia, friction and moves,
+        in place of those here. Prints it with the settings found, a row as soon as it is known.
+    workers
+        Divide the work over so many processes of this computer.
+    scheduler
+        Divide it over the workers of this dask scheduler: tcp://HOST:8786.
+    gpu
+        Judge many variants on a GPU.
     json
         Print everything as one line of JSON.
     """
@@ -94,6 +107,18 @@ def tune(
         if machine.on is not None:
             _on_the_machine(model, motor, moves, rig, machine, axis, json)
             return
+        if gpu:
+            from detent.motors.gpu import use
+
+            use()
+        if batch is not None:
+            from detent.cli.tune_batch import tune_batch
+
+            tune_batch(batch, model, motor, moves, rig, _options(set_), axis, vary, seed, variants, not no_corners,
+                       workers, scheduler)  # fmt: skip
+            return
+        if moves is None:
+            raise ValueError("--moves: say what is to be fast: --moves 200,1000x3")
         if motor is None:
             raise ValueError("--motor: name one (detent motor lists them), or a TOML file of your own; or --on PORT")
         if machine != NO_MACHINE:
@@ -104,12 +129,12 @@ def tune(
         found = made(motor, rig, winding_of(_law(model, options, axis), _step(rig, model)))
         task = Task(model, check_rig(found.rig, found.motor.name), asked, options, axis, spread_of(vary), seed,
                     not no_corners, final=variants)  # fmt: skip
-        with _interruptible() as cancelled, _watch() as watch:
+        with _interruptible() as cancelled, _divided(workers, scheduler) as divided, _watch() as watch:
             do: Any = tuning.each_move if each_move else tuning.tune
-            done = do(task, watch=watch, cancelled=cancelled)
+            done = do(task, watch=watch, cancelled=cancelled, **divided)
             answers: list[Tuned] = done if each_move else [done]
             if answers[0].found.whole and map_:
-                _map(answers[0], map_, watch, cancelled)
+                _map(answers[0], map_, watch, cancelled, divided)
         if into is not None:
             _into(answers[0], into, from_)
     except ValueError as error:  # TunerError, MotorError, SettingError, CatalogueError
@@ -128,16 +153,34 @@ def tune(
 
 
 def _on_the_machine(
-    model: str, motor: str | None, moves: str, rig: RigOptions, machine: MachineOptions, axis: str, json: bool
+    model: str, motor: str | None, moves: str | None, rig: RigOptions, machine: MachineOptions, axis: str, json: bool
 ) -> None:
     from dataclasses import replace
 
     from detent.cli.tune_on import tune_on
     from detent.tuner.task import moves_of
 
+    if moves is None:
+        raise ValueError("--moves: say which moves are to be tried: --moves 1000")
     if motor is not None or replace(rig, step=None) != RigOptions():
         raise ValueError("--on: trials on a machine need no model: leave --motor and the load out")
     tune_on(model, [move.steps for move in moves_of(moves)], rig.step, machine, axis=axis, json=json)
+
+
+@contextmanager
+def _divided(workers: int | None, scheduler: str | None) -> "Iterator[dict[str, Any]]":
+    """What a search is told so that others do its work; nothing where this process does."""
+    if workers is None and scheduler is None:
+        yield {}
+        return
+    from detent.cli.endings import failed
+    from detent.realtime.workers import Workers, WorkersLost
+
+    try:
+        with Workers(workers, scheduler) as found:
+            yield {"run": found.run, "ahead": 4 * found.count()}
+    except WorkersLost as error:
+        failed(error)
 
 
 def _options(words: list[str] | None) -> dict[str, object]:
@@ -215,12 +258,13 @@ def _watch() -> "Iterator[Watch]":
         yield watch
 
 
-def _map(tuned: "Tuned", paths: list[Path], watch: "Watch", cancelled: "Cancelled") -> None:
+def _map(tuned: "Tuned", paths: list[Path], watch: "Watch", cancelled: "Cancelled", divided: dict[str, Any]) -> None:
     from detent.outputs import tuning_figures
     from detent.outputs.files import write_whole
     from detent.tuner.map import loss_map
 
-    found = loss_map(tuned.task, tuned.found.point, watch=watch, cancelled=cancelled)
+    more = {"run": divided["run"], "together": 16 * divided["ahead"]} if divided else {}
+    found = loss_map(tuned.task, tuned.found.point, watch=watch, cancelled=cancelled, **more)
     for path in paths:
         if path.suffix.lower() == ".csv":
             write_whole(path, found.csv().encode())

@@ -7,15 +7,18 @@ ones cost more to carry about than to do.
 
 import logging
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from time import perf_counter
 from typing import Any, NamedTuple, Self, TypeVar
 
 from detent.extras import need
+from detent.tuner.judge import Job, Lost, judge_of
+from detent.tuner.task import Task
 
 CHUNK = 0.25  # s, of one worker
 AT_FIRST = 4  # pieces in a chunk while nobody knows how long one takes
 MOST = 512
+MOST_WORKERS = 256
 AHEAD = 3  # chunks for each worker that are on their way
 STARTED = 60.0  # s until the first worker must be there
 
@@ -42,13 +45,19 @@ class Workers:
     Raises MissingExtra without dask.distributed, WorkersLost where nobody answers.
     """
 
-    def __init__(self, count: int = 0, scheduler: str = "", *, patience: float = STARTED) -> None:
-        """`count` 0 is one for each processor. `patience`: seconds until the first must be there."""
+    def __init__(self, count: int | None = None, scheduler: str | None = None, *, patience: float = STARTED) -> None:
+        """By default one for each processor. `patience`: seconds until the first must be there. ValueError."""
+        if count is not None and scheduler is not None:
+            raise ValueError("--workers are processes of this computer, --scheduler has its own: give one of them")
+        if count is not None and not 1 <= count <= MOST_WORKERS:
+            raise ValueError(f"--workers {count}: say 1 to {MOST_WORKERS}")
         need("distributed", "work on several processes or machines needs")
         import distributed
 
         self._cluster: Any = None
         self._client: Any = None
+        self._shared: Any = None
+        self._carried: Any = None
         local: Any = distributed.LocalCluster
         make: Any = distributed.Client
         try:
@@ -83,14 +92,15 @@ class Workers:
         """
         from distributed import KilledWorker
 
-        [carried] = self._client.scatter([shared], broadcast=True, hash=False)
+        if self._carried is None or self._shared is not shared:  # once: a worker keeps what it has made of it
+            self._shared, self._carried = shared, self._client.submit(_itself, shared, pure=False)
         size, at = chunk or AT_FIRST, 0
         waiting: list[Any] = []
         try:
             while at < len(pieces) or waiting:
                 while at < len(pieces) and len(waiting) < AHEAD * max(self.count(), 1):
                     some = list(pieces[at : at + size])
-                    waiting.append(self._client.submit(_timed, do, carried, some, pure=False))
+                    waiting.append(self._client.submit(_timed, do, self._carried, some, pure=False))
                     at += len(some)
                 done: _Done = waiting.pop(0).result()
                 yield from done.answers
@@ -104,6 +114,10 @@ class Workers:
             ) from None
         finally:
             self._client.cancel(waiting)
+
+    def run(self, task: Task, jobs: Sequence[Job]) -> Iterable[Lost]:
+        """A `detent.tuner.judge.Runner`."""
+        return self.map(_judged, task, jobs)
 
     def close(self) -> None:
         """Let them go; local ones end."""
@@ -123,3 +137,13 @@ def _timed(do: Callable[[Any, list[Any]], list[Any]], shared: Any, pieces: list[
     began = perf_counter()
     answers = do(shared, pieces)
     return _Done(answers, perf_counter() - began)
+
+
+def _judged(task: Task, jobs: list[Job]) -> list[Lost]:
+    """Jobs of a task. A worker keeps the judge of the last one, with its trains."""
+    judge = judge_of(task)
+    return [judge.answer(job) for job in jobs]
+
+
+def _itself(shared: Any) -> Any:
+    return shared

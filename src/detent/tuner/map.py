@@ -44,11 +44,11 @@ class Map(NamedTuple):
 
 def loss_map(
     task: Task, point: Point, *, columns: int = COLUMNS, rows: int = ROWS, variants: int = VARIANTS,
-    run: Runner = one_by_one, watch: Watch = nobody, cancelled: Cancelled = never,
+    run: Runner = one_by_one, together: int = TOGETHER, watch: Watch = nobody, cancelled: Cancelled = never,
 ) -> Map:  # fmt: skip
     """The map about a point. Draws 0 to `variants` of the task judge each of its points.
 
-    TunerError if it was stopped: half a map says nothing.
+    `together` points are given to `run` at once. TunerError if it was stopped: half a map says nothing.
     """
     judge = judge_of(task)
     space = judge.space
@@ -71,8 +71,8 @@ def loss_map(
         if time is not None:
             times[j, i] = time
             jobs.append(((j, i), Job(here, drawn, to_the_end=True)))
-    for k in range(0, len(jobs), TOGETHER):
-        some = jobs[k : k + TOGETHER]
+    for k in range(0, len(jobs), together):
+        some = jobs[k : k + together]
         for (place, _), losers in zip(some, run(task, [job for _, job in some]), strict=True):
             lost[place] = len(losers) / variants
         if cancelled():

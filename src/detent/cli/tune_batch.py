@@ -1,0 +1,121 @@
+"""`detent tune MODEL --batch FILE`: a machine a row, over processes and machines if asked for."""
+
+import csv
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args, get_type_hints
+
+from detent.cli.rig import RigOptions
+
+if TYPE_CHECKING:
+    from detent.tuner.batch import Answer
+    from detent.tuner.task import Task
+
+MOST_ROWS = 100_000
+NAMED = ("motor", "moves")  # columns that are no options of the rig
+
+
+def tune_batch(
+    path: Path, model: str, motor: str | None, moves: str | None, rig: RigOptions, options: dict[str, object],
+    axis: str, vary: list[str] | None, seed: int, variants: int, at_corners: bool,
+    workers: int | None, scheduler: str | None,
+) -> None:  # fmt: skip
+    """Tune each row, and print the table with what was found as it comes."""
+    from detent.cli.endings import asked_wrongly, failed
+    from detent.cli.rig import made, spread_of
+    from detent.moves.law import winding_of
+    from detent.moves.laws import law
+    from detent.tuner.task import Task, check_rig, moves_of
+
+    try:
+        rows = _rows(path)
+        winding = winding_of(law(model, options, axis), rig.step)
+        tasks: list[Task] = []
+        for number, row in enumerate(rows, 2):
+            try:
+                name, distances = row.get("motor") or motor, row.get("moves") or moves
+                if name is None or distances is None:
+                    raise ValueError("there must be a motor and moves, in a column or as --motor and --moves")
+                found = made(name, _options(rig, row), winding)
+                tasks.append(Task(model, check_rig(found.rig, name), moves_of(distances), options, axis,
+                                  spread_of(vary), seed, at_corners, final=variants))  # fmt: skip
+            except ValueError as error:
+                raise ValueError(f"{path}, line {number}: {error}") from None
+    except ValueError as error:
+        asked_wrongly(error)
+    except OSError as error:
+        failed(f"{error.filename}: {error.strerror}")
+    write = csv.writer(sys.stdout, lineterminator="\n")
+    columns = list(rows[0])
+    write.writerow([*columns, "settings", "seconds", "lost", "of", "below", "problem"])
+    for row, answer in zip(rows, _answers(tasks, workers, scheduler), strict=True):
+        write.writerow([*(row[name] for name in columns), *answer])
+        sys.stdout.flush()
+
+
+def _answers(tasks: "Sequence[Task]", workers: int | None, scheduler: str | None) -> "Iterator[Answer]":
+    """What was found for each, in order, as it comes."""
+    from detent.cli.endings import asked_wrongly, failed
+    from detent.extras import MissingExtra
+    from detent.tuner.batch import answers
+
+    if workers is None and scheduler is None:
+        for task in tasks:
+            yield from answers(None, [task])
+        return
+    from detent.realtime.workers import Workers, WorkersLost
+
+    with ExitStack() as stack:
+        try:
+            found = stack.enter_context(Workers(workers, scheduler))
+            yield from found.map(answers, None, tasks, chunk=1)  # each takes longer than a chunk should
+        except ValueError as error:
+            asked_wrongly(error)
+        except (WorkersLost, MissingExtra) as error:
+            failed(error)
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        table = list(csv.reader(file, skipinitialspace=True))
+    table = [row for row in table if any(cell.strip() for cell in row)]
+    if len(table) < 2:
+        raise ValueError(
+            f"{path}: there must be a line of names, like motor,supply,inertia,moves, and a line a machine"
+        )
+    if len(table) > MOST_ROWS:
+        raise ValueError(f"{path}: {len(table) - 1} rows are more than {MOST_ROWS}: divide it")
+    from detent.controllers.catalogue import unknown
+
+    names = [cell.strip().lower().replace("-", "_") for cell in table[0]]
+    known = (*NAMED, *(field.name for field in fields(RigOptions)))
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{path}: {unknown('column', name, known)}")
+    if len(set(names)) < len(names):
+        raise ValueError(f"{path}: a column is there twice")
+    for number, row in enumerate(table[1:], 2):
+        if len(row) != len(names):
+            raise ValueError(f"{path}, line {number}: {len(row)} cells under {len(names)} names")
+    return [dict(zip(names, (cell.strip() for cell in row), strict=True)) for row in table[1:]]
+
+
+def _options(rig: RigOptions, row: dict[str, str]) -> RigOptions:
+    """The options of a row in place of those given; an empty cell leaves them."""
+    hints = get_type_hints(RigOptions)
+    changed: dict[str, Any] = {}
+    for name, text in row.items():
+        if name in NAMED or not text:
+            continue
+        kinds = get_args(hints[name]) or (hints[name],)
+        try:
+            if bool in kinds:
+                changed[name] = text.lower() in ("1", "yes", "true")
+            else:
+                changed[name] = float(text) if float in kinds else Path(text) if Path in kinds else text
+        except ValueError:
+            raise ValueError(f"{name}: {text!r} is no number") from None
+    return replace(rig, **changed)

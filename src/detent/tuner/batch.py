@@ -1,0 +1,33 @@
+"""Many tasks, each its own answer: a row of a batch."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from detent.tuner.search import search
+from detent.tuner.task import Task
+
+
+class Answer(NamedTuple):
+    """What was found for a task; `problem` says why nothing was."""
+
+    settings: str = ""
+    seconds: float | None = None  # of all moves, each as often as it is made
+    lost: int | None = None  # of `tried` fresh variants
+    tried: int | None = None
+    below: float | None = None  # what that proves of the rate of losses, at 95 %
+    problem: str = ""
+
+
+def answers(_: object, tasks: Sequence[Task]) -> list[Answer]:
+    """The answer to each; as `detent.realtime.workers.Workers.map` wants it."""
+    return [answer(task) for task in tasks]
+
+
+def answer(task: Task) -> Answer:
+    """The answer to a task. It hangs on the task alone."""
+    try:
+        found = search(task)
+    except ValueError as error:  # nothing moves this load, or a motor without data
+        return Answer(problem=str(error))
+    check = found.check
+    return Answer(str(found.profile), round(found.time, 9), check.lost, check.variants, check.bound)
