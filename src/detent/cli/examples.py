@@ -5,6 +5,8 @@ import tomllib
 from pathlib import Path
 from typing import Literal
 
+from detent.realtime.examples import home
+
 
 def examples(
     do: Literal["list", "copy"] = "list", name: str | None = None, folder: Path | None = None, *, json: bool = False
@@ -34,13 +36,6 @@ def examples(
     if name is None:
         asked_wrongly(f"say which: detent examples copy NAME; there are: {', '.join(names())}")
     _copy(place(name), folder if folder is not None else Path(name), json)
-
-
-def home() -> Path:
-    """The examples: beside an installed package, or in the project's own folder."""
-    package = Path(__file__).parents[1]
-    installed = package / "examples"
-    return installed if installed.is_dir() else package.parents[1] / "examples"
 
 
 def names() -> list[str]:

@@ -98,11 +98,11 @@ def workbench(
         Which real unit is meant, and its line.
     """
     from detent.cell.description import Problem
-    from detent.cli.examples import home
     from detent.cli.serve import asked_endpoints
     from detent.cli.target import asked_wrongly, failed
     from detent.cli.target import target as find
     from detent.extras import MissingExtra, need
+    from detent.realtime.examples import home
     from detent.realtime.images import ImagesUnusable, cell_name, default_folder
 
     links = list(pty) if pty is not None else None

@@ -19,6 +19,7 @@ from detent.cell.history import Cut
 from detent.outputs.signals import Signals
 from detent.pins import Level
 from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.target import target as find
 from detent.ticks import SECOND, Ns
 from detent.workbench import exports
 from detent.workbench.messages import (
@@ -456,6 +457,27 @@ class Bench:
                 Path(wanted.where).unlink()  # of the one that is gone; its terminal may be another's by now
         await self._start(self._order._replace(deeds=deeds, until=until, held=True, placed=placed))
         self.crashed = None
+        self._call_back()
+
+    async def open_another(self, target: str) -> None:
+        """Show the cell of `target` in place of this one, at the endpoints that were asked for, or with its own.
+
+        If that fails the old one is begun anew. Raises Problem, BenchError.
+        """
+        find(target)  # what is wrong with it is said while the old one goes on
+        before = self._order
+        wanted = before._replace(target=target, straps=(), options=(), deeds=(), until=0)
+        await self.close()
+        self._closing, self.crashed = False, None
+        self._asked.clear()
+        try:
+            await self._start(wanted)
+        except (Problem, BenchError):
+            await self.close()
+            self._closing = False
+            await self._start(before)
+            raise
+        self._order = wanted
         self._call_back()
 
     # -- looking at what happened --------------------------------------------------------------------------

@@ -30,6 +30,10 @@ class Drafts:
         """Nothing is made before the first draft is kept. `cell` is `realtime.images.cell_name` of the cell."""
         self._folder, self._cell = folder / "drafts", cell
 
+    def belong_to(self, cell: str) -> None:
+        """From now on they are those of another cell, named likewise; those of the one before stay kept."""
+        self._cell = cell
+
     def get(self, name: str) -> Draft | None:
         """The draft of that name; None if there is none, or its file cannot be understood."""
         try:

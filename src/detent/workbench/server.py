@@ -18,20 +18,23 @@ from nicegui import ui
 
 import detent
 from detent.workbench import filing, shell
+from detent.workbench.beginning import Beginning
 from detent.workbench.board import Board
 from detent.workbench.drafts import Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.guard import Guard, names_of_this_machine
 from detent.workbench.listening import Listening, Place
 from detent.workbench.live import Live
-from detent.workbench.pages import Page, Window, cell, motion, program, scope, terminal, unit
+from detent.workbench.pages import Page, Window, begin, cell, motion, program, scope, terminal, unit
 from detent.workbench.stopping import Stopping
 from detent.workbench.units.registry import Units
 
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
 
-PAGES: tuple[Page, ...] = (cell.PAGE, program.PAGE, terminal.PAGE, scope.PAGE, motion.PAGE, unit.PAGE)
+PAGES: tuple[Page, ...] = (
+    cell.PAGE, program.PAGE, terminal.PAGE, scope.PAGE, motion.PAGE, unit.PAGE, begin.PAGE,
+)  # fmt: skip
 """The pages in the order of their tabs."""
 
 PATIENCE = 2  # s that open windows are given when the server ends
@@ -57,6 +60,7 @@ def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place, st
     guard = Guard(site, place.host, place.token, names_of_this_machine())
     Board(bench, live)
     filing.offer(live, folder, drafts)
+    Beginning(bench, live, folder, drafts)
 
     async def live_socket(socket: WebSocket) -> None:
         await live.serve(socket)
