@@ -12,7 +12,7 @@ from tests.workbench.browser.windows import LOOKS, PHONE, Served, Window, Window
 
 ROOT = Path(__file__).parents[3]
 AXE = ROOT / ".venv" / "axe" / "node_modules" / "axe-core" / "axe.min.js"
-PAGES = ("/", "/program", "/terminal", "/scope", "/motion")
+PAGES = ("/", "/program", "/terminal", "/scope", "/motion", "/unit", "/begin")
 SERIOUS = ("serious", "critical")
 LEAST_CONTRAST, LEAST_TYPE = 4.5, 11  # WCAG 2.1, 1.4.3; px
 
@@ -47,6 +47,8 @@ READY = {
     "/terminal": ".rows",
     "/scope": ".scope canvas",
     "/motion": ".motion input[type=range]",
+    "/unit": ".connect .list button",
+    "/begin": ".place",
 }
 
 

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 
 import pytest
+from tests.workbench.browser.test_access import AXE, findings
 from tests.workbench.browser.windows import LOOKS, Served, Windows
 
 SERVE = [sys.executable, "-c", "from detent.cli import main; main()", "serve", "dcb-274", "--tcp", "127.0.0.1:0"]
@@ -27,16 +28,19 @@ def bench(chromium: object, serve: Callable[..., Served], real: str) -> Served:
     return serve("dcb-274", real)
 
 
-def test_look(windows: Windows, bench: Served, real: str) -> None:
+def test_the_panel_shows_what_the_unit_tells_and_a_hand_moves_it(windows: Windows, bench: Served, real: str) -> None:
     for size, theme in LOOKS:
         window = windows.new(bench, size=size, theme=theme).open("/unit")
         window.until(KNOWN)
         window.page.get_by_role("textbox", name="Line to send").fill("X")
         window.page.get_by_role("textbox", name="Line to send").press("Enter")
         window.page.locator(".answers td").first.wait_for()
-        window.page.get_by_role("button", name="Jog plus by steps").click()
+        window.page.get_by_role("button", name="+ step, jog plus").click()
         window.until("() => document.querySelector('[data-role=sent]').textContent")
         window.picture(f"unit-{size[0]}-{theme}")
+        assert window.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        if AXE.exists():
+            assert findings(window) == []
         if size[0] < 500:
             window.page.evaluate("document.querySelector('.bench .talk').scrollIntoView()")
             window.picture(f"unit-{size[0]}-{theme}-b")
@@ -44,3 +48,45 @@ def test_look(windows: Windows, bench: Served, real: str) -> None:
         window.page.get_by_role("tab", name="Connect…").click()
         window.page.locator("[data-role=cell] button").first.wait_for()
         window.picture(f"unit-connect-{size[0]}-{theme}")
+
+
+def test_the_same_line_goes_to_the_unit_and_to_its_emulation(windows: Windows, bench: Served) -> None:
+    window = windows.new(bench).open("/unit")
+    window.until(KNOWN)
+    page = window.page
+    if "dcb-274 (cell)" not in window.get("r.names"):
+        page.get_by_role("tab", name="Connect…").click()
+        page.locator("[data-role=cell] button").first.click()
+    window.until("() => detent.get('r.dcb-274 (cell)')?.position === 0")
+    page.get_by_role("combobox", name="Send to another unit, too").select_option(index=1)
+    page.get_by_role("textbox", name="Line to send").fill("X")
+    page.get_by_role("textbox", name="Line to send").press("Enter")
+    page.locator(".answers .same").wait_for()
+    window.picture("unit-beside")
+
+
+def test_esc_twice_stops_a_unit_on_every_page(windows: Windows, bench: Served, real: str) -> None:
+    window = windows.new(bench).open("/unit")
+    window.until(KNOWN)
+    name = next(name for name in window.get("r.names") if real in name)
+    window.call("unit_say", name, "M 300")
+    window.until("(name) => detent.get(`r.${name}`).moving", name)
+    window.page.get_by_role("link", name="Scope").click()
+    window.page.locator(".scope canvas").first.wait_for()
+    window.page.keyboard.press("Escape")
+    window.page.keyboard.press("Escape")
+    window.until("(name) => detent.get(`r.${name}`).moving === false", name)
+    assert window.get(f"r.{name}")["outcome"] == "stops by its ramp"
+
+
+def test_a_key_that_is_held_runs_the_axis_until_it_is_let_go(windows: Windows, bench: Served, real: str) -> None:
+    window = windows.new(bench).open("/unit")
+    window.until(KNOWN)
+    name = next(name for name in window.get("r.names") if real in name)
+    window.page.get_by_role("tab", name=name).click()
+    button = window.page.get_by_role("button", name="hold +: run plus")
+    button.hover()
+    window.page.mouse.down()
+    window.until("(name) => detent.get(`r.${name}`).moving", name)
+    window.page.mouse.up()
+    window.until("(name) => detent.get(`r.${name}`).moving === false", name)

@@ -369,6 +369,7 @@ function markTab() {
     else tab.removeAttribute("aria-current");
   }
   const here = document.querySelector("nav.tabs a[aria-current]");
+  here?.scrollIntoView({ block: "nearest", inline: "center" }); // on a phone the tabs are wider than the window
   const title = document.documentElement.dataset.title || "Detent";
   document.title = here ? `${here.dataset.name} \u2013 ${title}` : title;
 }

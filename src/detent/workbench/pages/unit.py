@@ -99,12 +99,12 @@ def _front(rates: str) -> str:
 
 def _hands() -> str:
     jogs = "".join(
-        f'<button class="key" data-jog="{sign}" aria-label="Jog {word} by steps">{text}</button>'
+        f'<button class="key" data-jog="{sign}" aria-label="{text}, jog {word}">{text}</button>'
         for sign, word, text in ((-1, "minus", "&minus; step"), (1, "plus", "+ step"))
     )
     holds = "".join(
-        f'<button class="key hold" data-hold="{sign}" aria-label="Run {word} while held">{text}</button>'
-        for sign, word, text in ((-1, "minus", "&#9664; hold"), (1, "plus", "hold &#9654;"))
+        f'<button class="key hold" data-hold="{sign}" aria-label="{text}: run {word}">{text}</button>'
+        for sign, word, text in ((-1, "minus", "&minus; hold"), (1, "plus", "hold +"))
     )
     return f"""<section class="panel hand" aria-label="Hands"><div class="panel-head"><h2 class="grow">Hands</h2>
 <button class="key small stop" data-role="stop" data-help="By its ramp; again: at once. Esc twice stops everything.">
