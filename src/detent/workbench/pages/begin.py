@@ -74,7 +74,8 @@ leads to.</p>
 <select class="field" data-role="model" aria-label="Commands of">{models}</select></div>
 <div class="row"><input class="field grow" data-role="search" type="search" aria-label="Search the commands"
  placeholder="letter, word, section of the manual"></div>
-<div class="scroll-x" tabindex="0" role="group" aria-label="Commands found"><table data-role="commands"></table></div></section>
+<div class="scroll-x" tabindex="0" role="group" aria-label="Commands found">
+<table data-role="commands"></table></div></section>
 <section class="panel docs" aria-label="Documentation"><div class="panel-head"><h2>Documentation</h2></div>
 {docs}</section></div></div>"""
 
