@@ -62,7 +62,7 @@ def test_no_page_has_a_serious_finding_in_any_size_or_theme(path: str, windows: 
         settle(window)
         window.picture(f"access{path.replace('/', '-')}-{size[0]}-{theme}")
         found += [f"{size[0]} {theme}: {finding}" for finding in findings(window)]
-        assert window.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), (
+        assert window.page.evaluate("document.documentElement.scrollWidth") <= size[0], (
             f"{size[0]}: wider than the window"
         )
         window.page.close()
