@@ -96,6 +96,8 @@ upload supersigma {port} {text}.toml |
 download gs-c200 {port} {text}.toml | over it with --force
 download gs-c20 {port} | did you mean gs-c200
 compare gs-c200 {port} {missing}.src | No such file
+compare-moves gs-c20 S=1 S=2 --motor qsh4218-41-10-035 --moves 100 --supply 24 | did you mean gs-c200
+compare-moves gs-c200 S=1 Q=2 --motor qsh4218-41-10-035 --moves 100 --supply 24 | no setting 'Q'
 motor qsh4218-41-10-03 | did you mean
 motor qsh4218-41-10-035 --move ten | ten
 motor {missing}.toml |

@@ -40,7 +40,7 @@ class Bench:
     """A bench of one unit that keeps what it is sent."""
 
     def __init__(self, held: bool) -> None:
-        self.state = SimpleNamespace(held=held)
+        self.state = SimpleNamespace(held=held, real=None)
         self.picture = SimpleNamespace(
             units={"bar": SimpleNamespace(line="bar")}, lines={"bar": SimpleNamespace(host=None)}
         )

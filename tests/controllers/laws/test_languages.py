@@ -19,12 +19,12 @@ from detent.cell.cell import Cell
 from detent.cell.description import parse
 from detent.cell.host import HostPort
 from detent.cli import assemble as verbs
-from detent.cli import program as program_verbs
 from detent.controllers import catalogue
 from detent.hosts.backups import Backup
 from detent.hosts.dcb274 import BlockingDcb274, Dcb274
 from detent.hosts.gsc200 import BlockingGsC200, GsC200
 from detent.realtime.images import pack
+from detent.workbench.units import programs
 
 Line = Callable[[Random], str]
 
@@ -149,14 +149,14 @@ def units_keep_programs(model: str, text: str) -> bool:
         return False
     program, language = places(made), catalogue.language(model)
     cell, driver = module(model)
-    driver.write_program(program_verbs._lines(made))
+    driver.write_program(programs.lines_of(made))
     memory = cell.controller("u").program_memory()
     for placed in made.placed:
         assert memory[placed.address : placed.address + len(placed.code)] == placed.code, f"{placed.text} is elsewhere"
     starts = sorted({at for at in program if not any(p.address + len(p.code) == at for p in made.placed)})
     for start in starts if model == "dcb-274" else [0]:
         lines = driver.read_program(start) if model == "dcb-274" else driver.read_program()
-        again = taken(model, program_verbs._source(language, lines))
+        again = taken(model, programs.source_of(language, lines))
         assert again is not None, "what download prints is refused"
         for address, told in places(again).items():
             assert program.get(address, told) == told, f"download has {told} at {address}"
