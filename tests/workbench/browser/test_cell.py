@@ -228,11 +228,12 @@ def test_a_fault_that_cannot_be_says_why_and_breaks_nothing(window: Window) -> N
 def test_what_is_sent_while_the_cell_stands_waits_in_sight_and_is_sent_when_it_goes_on(window: Window) -> None:
     window.call("hold")
     window.until("() => detent.get('held')")
-    for text in ("V1", "V2"):
+    for text, told in (("V1", "1 command waits"), ("V2", "2 commands wait")):
         field = window.page.get_by_label("Command to bar")
         field.fill(text)
         field.press(ENTER)
-    window.page.get_by_text("2 commands wait").wait_for()
+        window.page.get_by_text(told).wait_for()
+        window.until("() => document.querySelector('[aria-label=\"Command to bar\"]').value === ''")
     window.call("withdraw", window.get("queue")[0][0])
     window.page.get_by_text("1 command waits").wait_for()
     stood = window.get("now")
