@@ -4,26 +4,26 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from tests.cell.cells import cell
-from tests.cell.test_copies import DEEDS, DESCRIPTION, FILES
-from tests.cell.test_history import SETTINGS, Mirror, deed, example, look
+from tests.cell.test_copies import ACTIONS, DESCRIPTION, FILES
+from tests.cell.test_history import SETTINGS, Mirror, action, example, look
 
+from detent.cell.actions import Break, SetPin, SetSwitch, Type
 from detent.cell.breakage import StuckSwitch
-from detent.cell.deeds import Break, SetPin, SetSwitch, Type
 from detent.cell.history import MOST_BRANCHES, History
 from detent.cell.stores import Stores
 from detent.ticks import MS, SECOND
 
 
 @settings(SETTINGS, phases=[Phase.generate])
-@given(DEEDS, DEEDS, st.integers(1, 9))
+@given(ACTIONS, ACTIONS, st.integers(1, 9))
 def test_a_future_that_is_taken_again_is_the_same_entry_by_entry(first: list, other: list, part: int) -> None:
     history = History(cell(DESCRIPTION, FILES))
     mirror = Mirror(history)
 
-    def play(deeds: list) -> None:
-        for gap, (what, where, value) in deeds:
+    def play(actions: list) -> None:
+        for gap, (what, where, value) in actions:
             history.run_to(history.now + gap)
-            history.do(deed(what, where, value))
+            history.do(action(what, where, value))
 
     play(first)
     history.run_to(history.now + 300 * MS)
@@ -95,7 +95,7 @@ def test_a_future_left_on_the_way_to_another_is_taken_again_whole() -> None:
     history.do(SetSwitch("stop", 0))
     history.run_to(2 * SECOND)
     first = look(history)
-    history.rewind(3 * SECOND // 2)  # behind the deed
+    history.rewind(3 * SECOND // 2)  # behind the action
     history.do(SetSwitch("stop", 1))
     history.run_to(3 * SECOND)
     history.rewind(SECOND // 2)  # before it: the way to both futures is left too

@@ -80,7 +80,7 @@ power = { two = true }
 
 FILES = {"one.gsc": "S20\nA1\n+60\nC1\nG0\nL2\n", "two.gsc": "S30\n+20\n-20\n"}
 UNITS = st.sampled_from(["one", "two"])
-DEEDS = st.lists(
+ACTIONS = st.lists(
     st.tuples(
         st.sampled_from([0, 0, 1, 1 * MS]) | st.integers(0, 60 * MS),
         st.one_of(
@@ -100,8 +100,8 @@ def made(**options: object) -> Cell:
     return cell(DESCRIPTION, FILES, **options)
 
 
-def do(target: Cell, deeds: list) -> None:
-    for gap, (what, where, value) in deeds:
+def do(target: Cell, actions: list) -> None:
+    for gap, (what, where, value) in actions:
         target.run_to(target.now + gap)
         if what == "set_pin":
             target.set_pin(where, "UI1", value)
@@ -118,19 +118,19 @@ def all_of(target: Cell) -> list:
 
 
 @SETTINGS
-@given(DEEDS, st.booleans())
-def test_the_same_inputs_give_the_same_recording(deeds: list, line_timing: bool) -> None:
+@given(ACTIONS, st.booleans())
+def test_the_same_inputs_give_the_same_recording(actions: list, line_timing: bool) -> None:
     recordings = []
     for _ in range(2):
         target = made(line_timing=line_timing)
-        do(target, deeds)
+        do(target, actions)
         target.run_to(target.now + 300 * MS)
         recordings.append(all_of(target))
     assert recordings[0] == recordings[1]
 
 
 @SETTINGS
-@given(DEEDS, DEEDS, DEEDS, st.booleans())
+@given(ACTIONS, ACTIONS, ACTIONS, st.booleans())
 def test_a_copy_goes_on_as_the_cell_would_and_neither_minds_the_other(
     before: list, after: list, other: list, line_timing: bool
 ) -> None:
@@ -154,11 +154,11 @@ def test_a_copy_goes_on_as_the_cell_would_and_neither_minds_the_other(
 
 
 @SETTINGS
-@given(DEEDS, st.lists(st.integers(0, 400 * MS), max_size=20))
-def test_it_does_not_matter_in_how_many_calls_time_passes(deeds: list, stops: list[int]) -> None:
+@given(ACTIONS, st.lists(st.integers(0, 400 * MS), max_size=20))
+def test_it_does_not_matter_in_how_many_calls_time_passes(actions: list, stops: list[int]) -> None:
     whole, sliced = made(), made()
-    do(whole, deeds)
-    do(sliced, deeds)
+    do(whole, actions)
+    do(sliced, actions)
     until = whole.now + 400 * MS
     whole.run_to(until)
     start = sliced.now
@@ -171,10 +171,10 @@ def test_it_does_not_matter_in_how_many_calls_time_passes(deeds: list, stops: li
 
 
 @SETTINGS
-@given(DEEDS)
-def test_times_of_a_recording_rise(deeds: list) -> None:
+@given(ACTIONS)
+def test_times_of_a_recording_rise(actions: list) -> None:
     target = made(line_timing=True)
-    do(target, deeds)
+    do(target, actions)
     target.run_to(target.now + 300 * MS)
     assert target.recording is not None
     for unit in target.recording.units:

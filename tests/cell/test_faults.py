@@ -5,9 +5,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.cell.cells import cell, edges
 
+from detent.cell.actions import Break, TimedAction
 from detent.cell.breakage import Fault, OnLine, StuckPin, StuckSwitch, SupplyDip, WriteFailure
 from detent.cell.cell import Cell
-from detent.cell.deeds import Action, Break
 from detent.lines.faults import BitErrors, CableOut, Delay, LostCharacters
 from detent.lines.line import Line
 from detent.ticks import MS, SECOND
@@ -218,7 +218,7 @@ FAULTS = st.one_of(
     st.builds(WriteFailure, st.sampled_from(["a", "b"]), st.integers(0, 2)),
     st.builds(SupplyDip, st.sampled_from(["a", "b"])),
 )
-DEEDS = st.lists(
+ACTIONS = st.lists(
     st.tuples(
         st.sampled_from([0, 0, MS]) | st.integers(0, 60 * MS),
         st.one_of(
@@ -235,8 +235,8 @@ DEEDS = st.lists(
 )
 
 
-def do(target: Cell, deeds: list) -> None:
-    for gap, (what, *arguments) in deeds:
+def do(target: Cell, actions: list) -> None:
+    for gap, (what, *arguments) in actions:
         target.run_to(target.now + gap)
         try:
             getattr(target, what)(*arguments)
@@ -254,10 +254,10 @@ SETTINGS = settings(max_examples=60, deadline=None, suppress_health_check=list(H
 
 
 @SETTINGS
-@given(DEEDS, st.booleans())
-def test_a_cell_built_with_the_journal_makes_the_same_recording(deeds: list, line_timing: bool) -> None:
+@given(ACTIONS, st.booleans())
+def test_a_cell_built_with_the_journal_makes_the_same_recording(actions: list, line_timing: bool) -> None:
     made = cell(TWO, FILES, line_timing=line_timing)
-    do(made, deeds)
+    do(made, actions)
     until = made.now + 300 * MS
     made.run_to(until)
     again = cell(TWO, FILES, line_timing=line_timing, journal=list(made.journal))
@@ -266,7 +266,7 @@ def test_a_cell_built_with_the_journal_makes_the_same_recording(deeds: list, lin
 
 
 @SETTINGS
-@given(DEEDS, DEEDS, st.booleans())
+@given(ACTIONS, ACTIONS, st.booleans())
 def test_a_copy_of_a_broken_cell_goes_on_as_the_cell_does(before: list, after: list, line_timing: bool) -> None:
     made = cell(TWO, FILES, line_timing=line_timing)
     do(made, before)
@@ -283,4 +283,4 @@ def test_the_journal_has_faults_as_data() -> None:
     made.run_to(5 * MS)
     made.breaks(OnLine(0, CableOut()), 7 * MS)
     made.run_to(20 * MS)
-    assert list(made.journal) == [Action(5 * MS, Break(OnLine(0, CableOut()), 7 * MS), True)]
+    assert list(made.journal) == [TimedAction(5 * MS, Break(OnLine(0, CableOut()), 7 * MS), True)]

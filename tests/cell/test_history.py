@@ -6,11 +6,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.cell.cells import cell
-from tests.cell.test_copies import DEEDS, DESCRIPTION, FILES
+from tests.cell.test_copies import ACTIONS, DESCRIPTION, FILES
 
+from detent.cell.actions import Action, Load, PlaceSwitch, Power, Release, Send, SetPin, SetSwitch, Start, Type
 from detent.cell.build import build
 from detent.cell.cell import Cell
-from detent.cell.deeds import Deed, Load, PlaceSwitch, Power, Release, Send, SetPin, SetSwitch, Start, Type
 from detent.cell.description import parse
 from detent.cell.history import Broken, Cut, History
 from detent.cell.recording import Batch
@@ -29,7 +29,7 @@ def example(name: str) -> Cell:
     return build(parse(path.read_text(), str(path)), lambda file: (path.parent / file).read_text())
 
 
-def deed(what: str, where: object, value: object) -> Deed:
+def action(what: str, where: object, value: object) -> Action:
     match what:
         case "type":
             return Type(str(where), str(value))
@@ -49,16 +49,16 @@ class Mirror:
     def __init__(self, history: History) -> None:
         self.history = history
         self.batches: list[Batch] = []
-        self.deeds = 0
+        self.actions = 0
 
     def update(self) -> list[Batch]:
-        cut, first, batches, deeds = self.history.news()
+        cut, first, batches, actions = self.history.news()
         if cut is not None:
             del self.batches[cut.batches :]
-            self.deeds = cut.deeds
+            self.actions = cut.actions
         assert first == len(self.batches)
         self.batches += batches
-        self.deeds += len(deeds)
+        self.actions += len(actions)
         return self.batches
 
 
@@ -76,28 +76,28 @@ def _switches(cell: Cell) -> list:
     return [part for part in cell.parts[cell.wiring.units :] if hasattr(part, "level")]
 
 
-def with_deeds(deeds: list, line_timing: bool, **options: int) -> History:
+def with_actions(actions: list, line_timing: bool, **options: int) -> History:
     history = History(cell(DESCRIPTION, FILES, line_timing=line_timing), Stores(), **options)
-    for gap, (what, where, value) in deeds:
+    for gap, (what, where, value) in actions:
         history.run_to(history.now + gap)
-        history.do(deed(what, where, value))
+        history.do(action(what, where, value))
     history.run_to(history.now + 200 * MS)
     return history
 
 
 @SETTINGS
-@given(DEEDS, st.lists(st.integers(0, 800 * MS), min_size=1, max_size=6), st.booleans())
-def test_it_is_at_any_time_what_it_was_then(deeds: list, times: list[Ns], line_timing: bool) -> None:
-    history = with_deeds(deeds, line_timing)
+@given(ACTIONS, st.lists(st.integers(0, 800 * MS), min_size=1, max_size=6), st.booleans())
+def test_it_is_at_any_time_what_it_was_then(actions: list, times: list[Ns], line_timing: bool) -> None:
+    history = with_actions(actions, line_timing)
     mirror = Mirror(history)
     told = list(mirror.update())
     for at in times:
         straight = History(cell(DESCRIPTION, FILES, line_timing=line_timing))
-        for gap, (what, where, value) in deeds:
+        for gap, (what, where, value) in actions:
             if straight.now + gap > at:
                 break
             straight.run_to(straight.now + gap)
-            straight.do(deed(what, where, value))
+            straight.do(action(what, where, value))
         straight.run_to(min(at, history.end))
         history.rewind(at)
         assert look(history) == look(straight)
@@ -105,11 +105,11 @@ def test_it_is_at_any_time_what_it_was_then(deeds: list, times: list[Ns], line_t
 
 
 @SETTINGS
-@given(DEEDS, DEEDS, st.integers(0, 800 * MS), st.booleans())
+@given(ACTIONS, ACTIONS, st.integers(0, 800 * MS), st.booleans())
 def test_going_on_from_the_past_is_as_if_the_rest_had_never_been(
     before: list, after: list, at: Ns, line_timing: bool
 ) -> None:
-    history = with_deeds(before, line_timing)
+    history = with_actions(before, line_timing)
     mirror = Mirror(history)
     mirror.update()
     history.rewind(at)
@@ -119,17 +119,17 @@ def test_going_on_from_the_past_is_as_if_the_rest_had_never_been(
         if straight.now + gap > history.now:
             break
         straight.run_to(straight.now + gap)
-        straight.do(deed(what, where, value))
+        straight.do(action(what, where, value))
     straight.run_to(history.now)
     for each in (history, straight):
         for gap, (what, where, value) in after:
             each.run_to(each.now + gap)
-            each.do(deed(what, where, value))
+            each.do(action(what, where, value))
         each.run_to(each.now + 200 * MS)
     assert look(history) == look(straight)
     other = Mirror(straight)
     assert mirror.update() == other.update()
-    assert mirror.deeds == other.deeds
+    assert mirror.actions == other.actions
 
 
 @pytest.mark.parametrize("name", sorted(path.parent.name for path in EXAMPLES.glob("*/cell.toml")))
@@ -164,7 +164,7 @@ def test_what_was_not_told_yet_is_not_told_twice() -> None:
     assert mirror.update() == Mirror(other).update()
 
 
-def test_looking_back_keeps_the_present_and_a_deed_in_the_past_drops_it() -> None:
+def test_looking_back_keeps_the_present_and_an_action_in_the_past_drops_it() -> None:
     history = History(example("drilling"))
     history.run_to(3 * SECOND)
     history.stop("by hand")
@@ -417,7 +417,7 @@ def test_a_cell_without_a_recording_has_no_past() -> None:
         History(cell(LOOPING, LOOP, record=False))
 
 
-class TestDeeds:
+class TestActions:
     def test_a_program_is_put_into_memory_and_started(self) -> None:
         history = History(cell('[units.a]\nmodel = "gs-c200"\n'))
         other = cell(LOOPING, LOOP).controller("a").program_memory()

@@ -104,9 +104,9 @@ def test_a_long_homing_is_waited_for_however_long_it_takes(model: str) -> None:
 def test_while_it_moves_only_f_z_and_k_are_answered() -> None:
     _, unit = module("gs-c200")
     unit.move_by(1000)
-    for deed in (unit.position, unit.pins, unit.saved, lambda: unit.move_by(5), lambda: unit.activate(1)):
+    for action in (unit.position, unit.pins, unit.saved, lambda: unit.move_by(5), lambda: unit.activate(1)):
         with pytest.raises(Busy, match="wait"):
-            deed()
+            action()
     unit.halt()
     assert 0 < unit.position() < 1000
 

@@ -110,7 +110,7 @@ def test_errors_are_told_with_their_place_while_the_rest_keeps_its_addresses(edi
 
 def test_what_was_loaded_is_known_to_be_in_memory(editing: Editing, bench: Bench) -> None:
     assert run(editing.load("bar", SOURCE, True)) == "8 bytes loaded, and started"
-    assert [deed[0] for deed in bench.done] == ["load", "start"]
+    assert [action[0] for action in bench.done] == ["load", "start"]
     assert run(editing.check("bar", SOURCE))["loaded"] is True
     assert run(editing.check("bar", SOURCE + "A1\n"))["loaded"] is False
 

@@ -101,7 +101,7 @@ def test_the_drilling_cell_is_shown_held_gone_back_and_gone_on_with() -> None:
         assert not bench.state.past
         assert bench.state.end == 700 * MS
         assert bench.cut == cut + 1
-        assert [(m.kind, m.text) for m in bench.state.marks] == [("deed", "stop to 0")]
+        assert [(m.kind, m.text) for m in bench.state.marks] == [("action", "stop to 0")]
         await bench.pace(None)
         await bench.go()
         await bench.until(lambda s: s.now > 2 * SECOND or s.units["bar"].state == "ready")
@@ -176,7 +176,7 @@ def test_a_program_at_the_pseudo_terminal_is_answered_while_one_goes_back_in_tim
     play(scene, "gs-c200", straps=["CHS=low"], wanted=[Wanted("pty")])
 
 
-def test_deeds_with_pins_straps_supply_and_memory(tmp_path: Path) -> None:
+def test_actions_with_pins_straps_supply_and_memory(tmp_path: Path) -> None:
     async def scene(bench: Bench) -> None:
         unit = "gs-c200"
         await bench.set_pin(unit, "UI2", 0)

@@ -92,7 +92,7 @@ def test_nothing_is_shown_of_what_has_not_happened_and_of_what_is_forgotten(dril
 
 
 def test_after_the_past_was_changed_the_new_past_is_shown(drilling: Told) -> None:
-    from detent.cell.deeds import Power
+    from detent.cell.actions import Power
 
     told = example("drilling")
     told.run(2 * SECOND)

@@ -2,7 +2,7 @@
 
 from tests.workbench.told import Told, alone, example
 
-from detent.cell.deeds import Power, Send, SetPin, Type
+from detent.cell.actions import Power, Send, SetPin, Type
 from detent.lines.microbus import LET_GO
 from detent.ticks import MS, SECOND
 from detent.uart import characters

@@ -53,7 +53,7 @@ class Told:
         news = history.news()
         if news.cut is not None:
             self.mirror.cut(news.cut)
-        self.mirror.take(Happened(news.first, news.batches, news.deeds, found, history.first_batch))
+        self.mirror.take(Happened(news.first, news.batches, news.actions, found, history.first_batch))
         self.mirror.until = history.end
 
 

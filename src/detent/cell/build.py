@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
 from detent.cell import real_pins
+from detent.cell.actions import Power, SetSwitch, TimedAction, Type
 from detent.cell.cell import Cell
-from detent.cell.deeds import Action, Power, SetSwitch, Type
 from detent.cell.delivery import Store, Typed, no_store, nobody_asks
 from detent.cell.description import Description, Motor, Problem, ScriptEntry, Unit
 from detent.cell.parts import PARTS, Part
@@ -43,7 +43,7 @@ def build(
     store: Store = no_store,
     record: bool = True,
     line_timing: bool = True,
-    journal: Iterable[Action] = (),
+    journal: Iterable[TimedAction] = (),
     typed: Typed = nobody_asks,
     inputs: Mapping[tuple[str, str], Level] | None = None,
 ) -> Cell:
@@ -84,8 +84,8 @@ class _Builder:
         return Problem(self.description.file, key, message)
 
     def cell(
-        self, images: Mapping[str, bytes], store: Store, record: bool, line_timing: bool, journal: Iterable[Action],
-        typed: Typed, inputs: Mapping[tuple[str, str], Level],
+        self, images: Mapping[str, bytes], store: Store, record: bool, line_timing: bool,
+        journal: Iterable[TimedAction], typed: Typed, inputs: Mapping[tuple[str, str], Level],
     ) -> Cell:  # fmt: skip
         lines = self.line_units()
         self.make_units(lines, line_timing)
@@ -455,16 +455,16 @@ class _Builder:
 
     # -- script ------------------------------------------------------------------------------------------
 
-    def actions(self, number: int, entry: ScriptEntry) -> list[Action]:
+    def actions(self, number: int, entry: ScriptEntry) -> list[TimedAction]:
         """What one ``[[script]]`` entry does, in the order set, power, send."""
         key = f"script[{number}]"
         found = []
         for target, level in entry.set.items():
             name = self.settable(f"{key}.set", target)
-            found.append(Action(entry.at, SetSwitch(name, level)))
+            found.append(TimedAction(entry.at, SetSwitch(name, level)))
         for unit, on in entry.power.items():
             self.need_unit(f"{key}.power", unit)
-            found.append(Action(entry.at, Power(unit, on)))
+            found.append(TimedAction(entry.at, Power(unit, on)))
         if entry.send:
             if entry.to is None:
                 raise self.problem(f"{key}.to", "say which unit the line is for: to = 'UNIT'")
@@ -480,7 +480,7 @@ class _Builder:
                     self.controller(entry.to).frame(text)
                 except ValueError as error:
                     raise self.problem(f"{key}.send", str(error)) from None
-            found += [Action(entry.at, Type(entry.to, text)) for text in entry.send]
+            found += [TimedAction(entry.at, Type(entry.to, text)) for text in entry.send]
         return found
 
     def settable(self, key: str, target: str) -> str:

@@ -8,11 +8,9 @@ import copy
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 
-from detent.cell.breakage import Fault, find_pin
-from detent.cell.deeds import (
+from detent.cell.actions import (
     Action,
     Break,
-    Deed,
     Displace,
     Halt,
     Load,
@@ -24,7 +22,10 @@ from detent.cell.deeds import (
     SetPin,
     SetSwitch,
     Start,
+    TimedAction,
+    Type,
 )
+from detent.cell.breakage import Fault, find_pin
 from detent.cell.delivery import Delivery, Store, Typed, no_store, nobody_asks
 from detent.cell.recording import Log, Received, Recording
 from detent.cell.wiring import Talker, Wiring
@@ -35,7 +36,7 @@ from detent.ticks import NEVER, Ns, show_duration
 from detent.uart import Chars
 
 
-class Script(tuple[Action, ...]):
+class Script(tuple[TimedAction, ...]):
     """Actions in order of time. Immutable, and shared by copies of a cell."""
 
     __slots__ = ()
@@ -44,9 +45,9 @@ class Script(tuple[Action, ...]):
         return self
 
 
-def _switches_on(action: Action) -> bool:
+def _switches_on(action: TimedAction) -> bool:
     """Whether the script switches a unit on."""
-    return isinstance(action.deed, Power) and action.deed.on and not action.outside
+    return isinstance(action.what, Power) and action.what.on and not action.outside
 
 
 class Cell(Delivery):
@@ -58,7 +59,7 @@ class Cell(Delivery):
         parts: Sequence[Device],
         nets: Sequence[Net],
         lines: Sequence[Line],
-        script: Sequence[Action] = (),
+        script: Sequence[TimedAction] = (),
         *,
         store: Store = no_store,
         record: bool = True,
@@ -66,7 +67,7 @@ class Cell(Delivery):
     ) -> None:
         recording = Recording(wiring.names[: wiring.units]) if record else None
         super().__init__(wiring, parts, nets, lines, store, recording, typed)
-        self.journal: Log[Action] = Log()  # what was done from outside, if it records: `build` takes it
+        self.journal: Log[TimedAction] = Log()  # what was done from outside, if it records: `build` takes it
         self.journaling = False  # see `begin`
         self._script = Script(sorted(script, key=lambda action: action.at))
         self._next_action = 0
@@ -149,19 +150,19 @@ class Cell(Delivery):
                 units = [self.unit(name) for name in self._switched_on_with(action)]
                 self.supply_all([unit for unit in units if not self.faults.switches(self.wiring.names[unit], True)])
             else:
-                action.deed.do(self)
+                self.do(action.what)
             self._acting = False
             while min(self._deadlines) <= at:
                 self._advance_parts(at)
 
-    def _switched_on_with(self, action: Action) -> list[str]:
+    def _switched_on_with(self, action: TimedAction) -> list[str]:
         """The units that the script switches on in one go: that of `action`, and those of the actions behind it."""
-        units = [action.deed.unit]  # type: ignore[union-attr]
+        units = [action.what.unit]  # type: ignore[union-attr]
         while self._next_action < len(self._script):
             following = self._script[self._next_action]
             if following.at != action.at or not _switches_on(following):
                 break
-            units.append(following.deed.unit)  # type: ignore[union-attr]
+            units.append(following.what.unit)  # type: ignore[union-attr]
             self._next_action += 1
             self._note_next_action()
         return units
@@ -177,6 +178,36 @@ class Cell(Delivery):
             self._advance(now)
 
     # -- what the outside does ---------------------------------------------------------------------------
+
+    def do(self, action: Action) -> None:
+        """Do what is kept as data, now. Raises what the method of that name raises."""
+        match action:
+            case Send(line, data):
+                self.send(line, data)
+            case Type(unit, text):
+                self.type(unit, text)
+            case SetSwitch(switch, level):
+                self.set_switch(switch, level)
+            case SetPin(unit, pin, level):
+                self.set_pin(unit, pin, level)
+            case Release(unit, pin):
+                self.release(unit, pin)
+            case Power(unit, on):
+                self.power(unit, on)
+            case Load(unit, image, base):
+                self.load(unit, image, base)
+            case PlaceSwitch(switch, low, high):
+                self.place_switch(switch, low, high)
+            case Start(unit):
+                self.start(unit)
+            case Halt(unit):
+                self.halt(unit)
+            case Displace(unit, axis, by):
+                self.displace(unit, axis, by)
+            case Break(fault, lasting):
+                self.breaks(fault, lasting)
+            case Mend(fault):
+                self.mend(fault)
 
     def send(self, line: int, data: Chars) -> None:
         """The host of a line sends `data`, now; characters may be damaged already."""
@@ -325,7 +356,7 @@ class Cell(Delivery):
             self._catch_up()
         number = self.faults.begin(self, fault, lasting)
         if lasting is not None:
-            self._schedule(Action(self.now + lasting, Mend(number)))
+            self._schedule(TimedAction(self.now + lasting, Mend(number)))
         self._keep(Break(fault, lasting))
         return number
 
@@ -336,12 +367,12 @@ class Cell(Delivery):
         self.faults.mend(self, fault)
         self._keep(Mend(fault))
 
-    def _keep(self, deed: Deed) -> None:
+    def _keep(self, action: Action) -> None:
         """Note what is done from outside; it is done when everything else of this instant has happened."""
         if self.journaling and not self._acting:
-            self.journal.append(Action(self.now, deed, True))
+            self.journal.append(TimedAction(self.now, action, True))
 
-    def _schedule(self, action: Action) -> None:
+    def _schedule(self, action: TimedAction) -> None:
         """Put an action that is to come into the script, before those of the same time."""
         left = self._script[self._next_action :]
         place = bisect_left(left, action.at, key=lambda other: other.at)

@@ -2,7 +2,7 @@
 
 Copies of the cell (`Moment`) are kept from time to time, the farther back the fewer; between them the cell is run again
 with what was done to it, and does the same again. Going back and looking loses nothing: what lies ahead, up to the
-present, stays until the cell goes on from its past (`go`, or any deed); then that is dropped, and hosts and hands do
+present, stays until the cell goes on from its past (`go`, or any action); then that is dropped, and hosts and hands do
 what comes now. Hosts hear nothing twice, and non-volatile memories are not written twice (`stores`); when a past is
 gone on from, they are written back to what they were then.
 """
@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from detent.cell.actions import Action, Send, TimedAction
 from detent.cell.cell import Cell
-from detent.cell.deeds import Action, Deed, Send
 from detent.cell.delivery import Oscillation
 from detent.cell.mechanics import Mechanics
 from detent.cell.panel import Panel
@@ -39,7 +39,7 @@ MOST_EVENTS = 200_000  # likewise
 MOST_WAITING = 50_000  # batches that nobody has asked for: then a cell that runs as fast as it goes waits
 
 FAULTS = (Oscillation, MotorError, AssertionError, ArithmeticError, IndexError, AttributeError, RecursionError)
-"""What a deed makes a cell raise that cannot go on; other errors say that the deed is none."""
+"""What an action makes a cell raise that cannot go on; other errors say that the action is none."""
 
 Address = tuple[int, int]
 """A unit, by its number, and a byte of its program memory."""
@@ -68,34 +68,34 @@ class News(NamedTuple):
     cut: "Cut | None"
     first: int
     batches: Sequence[Batch]
-    deeds: Sequence[Action]
+    actions: Sequence[TimedAction]
 
 
 class Cut(NamedTuple):
-    """The past was changed: only the first `batches` and `deeds`, and what rotors did up to `at`, still hold."""
+    """The past was changed: only the first `batches` and `actions`, and what rotors did up to `at`, still hold."""
 
     at: Ns
     batches: int
-    deeds: int
+    actions: int
 
 
 class Branch(NamedTuple):
-    """A future that was left: the cell went on from `at` otherwise. It had come as far as `end`, with these deeds."""
+    """A future that was left: the cell went on from `at` otherwise. It had come as far as `end`, with these actions."""
 
     number: int
     at: Ns
     end: Ns
-    deeds: Sequence[Action]
+    actions: Sequence[TimedAction]
     first: int  # the number of the first of them: some of the instant `at` may have been done before
 
 
 class Moment:
     """A cell at one time, with everything that is counted up to there."""
 
-    __slots__ = ("batches", "broken", "cell", "deeds", "panel", "writes")
+    __slots__ = ("actions", "batches", "broken", "cell", "panel", "writes")
 
-    def __init__(self, cell: Cell, panel: Panel, batches: int = 0, deeds: int = 0, writes: int = 0) -> None:
-        self.cell, self.panel, self.batches, self.deeds, self.writes = cell, panel, batches, deeds, writes
+    def __init__(self, cell: Cell, panel: Panel, batches: int = 0, actions: int = 0, writes: int = 0) -> None:
+        self.cell, self.panel, self.batches, self.actions, self.writes = cell, panel, batches, actions, writes
         self.broken = ""  # why it cannot go on from there
 
     @property
@@ -105,7 +105,7 @@ class Moment:
 
     def copy(self) -> "Moment":
         """The same, and on its own from now on."""
-        return Moment(self.cell.copy(), self.panel.copy(), self.batches, self.deeds, self.writes)
+        return Moment(self.cell.copy(), self.panel.copy(), self.batches, self.actions, self.writes)
 
 
 class History:
@@ -127,14 +127,14 @@ class History:
         """ValueError for a cell that does not record."""
         if cell.recording is None:
             raise ValueError("this cell keeps no recording, so it has no past: build it with record=True")
-        cell.journaling = False  # deeds are kept here
+        cell.journaling = False  # actions are kept here
         self._stores, self._keep, self._on_stop = stores or Stores(), keep, on_stop
         self._here = Moment(cell, Panel(cell, shafts or {}))
         self._present: Moment | None = None  # None: that is where the cell stands
         self.motors = [k for k, part in enumerate(cell.parts) if isinstance(part, Mechanics)]  # by their number
-        self._deeds: list[Action] = []
-        self._first_deed = 0  # the number of the first that is kept
-        self._told = self._told_deeds = 0  # batches and deeds that `news` has told
+        self._actions: list[TimedAction] = []
+        self._first_action = 0  # the number of the first that is kept
+        self._told = self._told_actions = 0  # batches and actions that `news` has told
         self._fresh: list[Batch] = []
         self._cut: Cut | None = None
         self._deaf: list[Deaf] = []  # the lines, in the past
@@ -154,7 +154,7 @@ class History:
 
     @property
     def cell(self) -> Cell:
-        """The cell where it stands. To look at: deeds go through `do`."""
+        """The cell where it stands. To look at: actions go through `do`."""
         return self._here.cell
 
     @property
@@ -222,24 +222,24 @@ class History:
 
     # -- what is done to it ------------------------------------------------------------------------------
 
-    def do(self, deed: Deed) -> None:
+    def do(self, action: Action) -> None:
         """Do it, now, and let everything happen that it makes due in this instant; the past ends here, if this is it.
 
-        Raises what the deed raises, and Broken.
+        Raises what the action raises, and Broken.
         """
-        self._do(deed)
+        self._do(action)
         self._look()
 
-    def _do(self, deed: Deed) -> None:
+    def _do(self, action: Action) -> None:
         self._stand_here()
         cell = self.cell
         try:
-            _perform(cell, deed)
+            _perform(cell, action)
         except FAULTS as error:
-            self._keep_deed(deed)
+            self._keep_action(action)
             self._break(error)
             raise Broken(self.broken) from error
-        self._keep_deed(deed)
+        self._keep_action(action)
 
     @property
     def broken(self) -> str:
@@ -258,9 +258,9 @@ class History:
         self._stand_here()
         self.stopped = ""
 
-    def _keep_deed(self, deed: Deed) -> None:
-        self._deeds.append(Action(self.now, deed, outside=True))
-        self._here.deeds += 1
+    def _keep_action(self, action: Action) -> None:
+        self._actions.append(TimedAction(self.now, action, outside=True))
+        self._here.actions += 1
 
     def _stand_here(self) -> None:
         """Where it stands is the present: what lay behind is dropped."""
@@ -273,12 +273,12 @@ class History:
         self._keep_branches(here, left.now)
         for unit in self._stores.cut(here.writes):
             self._stores.write_back(unit, here.cell.controller(unit).kept_memory())
-        del self._deeds[here.deeds - self._first_deed :]
+        del self._actions[here.actions - self._first_action :]
         self._moments = [m for m in self._moments if m.batches <= here.batches and m.now <= here.now]
         self._fresh = self._fresh[: max(here.batches - self._told, 0)]
-        self._told, self._told_deeds = min(self._told, here.batches), min(self._told_deeds, here.deeds)
+        self._told, self._told_actions = min(self._told, here.batches), min(self._told_actions, here.actions)
         earlier = here.now if self._cut is None else min(here.now, self._cut.at)
-        self._cut = Cut(earlier, self._told, self._told_deeds)
+        self._cut = Cut(earlier, self._told, self._told_actions)
         self._do_pending()
 
     def _do_pending(self) -> None:
@@ -372,24 +372,24 @@ class History:
     def _next_again(self, moment: Moment) -> Ns | None:
         """When something happened next, by itself or because it was done."""
         at = moment.cell.next_event()
-        place = moment.deeds - self._first_deed
-        deed = self._deeds[place].at if place < len(self._deeds) else None
-        return min((each for each in (at, deed) if each is not None), default=None)
+        place = moment.actions - self._first_action
+        action = self._actions[place].at if place < len(self._actions) else None
+        return min((each for each in (at, action) if each is not None), default=None)
 
     def _again(self, moment: Moment, until: Ns, before: int | None = None) -> None:
         """What happened up to `until` happens again, to this copy; nobody outside hears of it.
 
-        Only deeds `before` that number, if there is one, are done.
+        Only actions `before` that number, if there is one, are done.
         """
         cell, stores = moment.cell, self._stores
         writes, stores.writes = stores.writes, moment.writes
-        last = None if before is None else max(before - self._first_deed, 0)
-        for action in self._deeds[moment.deeds - self._first_deed : last]:
+        last = None if before is None else max(before - self._first_action, 0)
+        for action in self._actions[moment.actions - self._first_action : last]:
             if action.at > until:
                 break
             cell.run_to(action.at)
-            _perform(cell, action.deed)
-            moment.deeds += 1
+            _perform(cell, action.what)
+            moment.actions += 1
         cell.run_to(until)
         batches = _taken(cell)
         moment.batches += len(batches)
@@ -418,21 +418,21 @@ class History:
 
     def _keep_branches(self, here: Moment, end: Ns) -> None:
         """What comes after `here`, as far as `end`, is left; and so is what began there of futures left before."""
-        gone = tuple(self._deeds[here.deeds - self._first_deed :])
+        gone = tuple(self._actions[here.actions - self._first_action :])
         kept = []
         for branch in self._branches:
-            if branch.at > here.now or branch.first > here.deeds:
-                way = (*gone[: branch.first - here.deeds], *branch.deeds)
-                branch = branch._replace(at=here.now, deeds=way, first=here.deeds)
+            if branch.at > here.now or branch.first > here.actions:
+                way = (*gone[: branch.first - here.actions], *branch.actions)
+                branch = branch._replace(at=here.now, actions=way, first=here.actions)
             kept.append(branch)
         if end > here.now:
             self._branched += 1
-            kept.append(Branch(self._branched, here.now, end, gone, here.deeds))
+            kept.append(Branch(self._branched, here.now, end, gone, here.actions))
         self._branches = kept[-MOST_BRANCHES:]
 
     def _fork(self, branch: Branch) -> Moment:
         """A copy of the cell where that future was left."""
-        before = next(m for m in reversed(self._moments) if m.now <= branch.at and m.deeds <= branch.first).copy()
+        before = next(m for m in reversed(self._moments) if m.now <= branch.at and m.actions <= branch.first).copy()
         self._again(before, branch.at, branch.first)
         return before
 
@@ -443,7 +443,7 @@ class History:
 
     def _reaches(self, branch: Branch) -> bool:
         first = self._moments[0]
-        return first.now <= branch.at and first.deeds <= branch.first
+        return first.now <= branch.at and first.actions <= branch.first
 
     def branch(self, number: int) -> Branch:
         """The future of that number. Raises KeyError."""
@@ -467,11 +467,11 @@ class History:
         stops, self.breakpoints = self.breakpoints, set()
         errors, self.break_on_errors = self.break_on_errors, False
         self.stopped = ""
-        for action in (*branch.deeds, None):
+        for action in (*branch.actions, None):
             self.run_to(branch.end if action is None else action.at)
             if action is not None:
                 with suppress(Broken, ValueError, KeyError):  # as it was then
-                    self.do(action.deed)
+                    self.do(action.what)
         for line in self.cell.lines:
             line.take()
         self.breakpoints, self.break_on_errors = stops, errors
@@ -482,12 +482,12 @@ class History:
         branch = self.branch(number)
         until, there = min(branch.end, self.end), self._fork(branch)
         here = there.copy()
-        deeds, first = self._deeds, self._first_deed
-        self._deeds, self._first_deed, self._stores.idle = list(branch.deeds), branch.first, True
+        actions, first = self._actions, self._first_action
+        self._actions, self._first_action, self._stores.idle = list(branch.actions), branch.first, True
         try:
             self._again(there, until)
         finally:
-            self._deeds, self._first_deed, self._stores.idle = deeds, first, False
+            self._actions, self._first_action, self._stores.idle = actions, first, False
         self._again(here, until)
         return there, here
 
@@ -498,9 +498,9 @@ class History:
         self._look()
         cut, first = self._cut, self._told
         batches, self._fresh = self._fresh, []
-        deeds = self._deeds[self._told_deeds - self._first_deed :]
-        self._told, self._told_deeds, self._cut = first + len(batches), self._told_deeds + len(deeds), None
-        return News(cut, first, batches, deeds)
+        actions = self._actions[self._told_actions - self._first_action :]
+        self._told, self._told_actions, self._cut = first + len(batches), self._told_actions + len(actions), None
+        return News(cut, first, batches, actions)
 
     @property
     def first_batch(self) -> int:
@@ -557,14 +557,14 @@ class History:
             del self._moments[0]
         first = self._moments[0]
         self._stores.forget(first.writes)
-        gone = min(first.deeds, self._told_deeds) - self._first_deed
-        del self._deeds[:gone]
-        self._first_deed += gone
+        gone = min(first.actions, self._told_actions) - self._first_action
+        del self._actions[:gone]
+        self._first_action += gone
 
 
-def _perform(cell: Cell, deed: Deed) -> None:
+def _perform(cell: Cell, action: Action) -> None:
     """Do it, and let everything of this instant happen."""
-    deed.do(cell)
+    cell.do(action)
     cell.run_to(cell.now)
 
 

@@ -156,8 +156,8 @@ def _print(verb: str, answer: dict[str, Any]) -> None:
         _print_faults(console, answer["faults"])
     elif verb == "journal":
         for entry in answer["journal"]:
-            at, deed = entry.pop("at_ns"), entry.pop("deed")
-            console.print(f"{_seconds(at)}  {deed}  {_named(entry)}", markup=False)
+            at, action = entry.pop("at_ns"), entry.pop("deed")
+            console.print(f"{_seconds(at)}  {action}  {_named(entry)}", markup=False)
     else:
         told = [f"fault {answer['fault']}"] if "fault" in answer else []
         told += [f"mended {_listed(answer['mended'])}"] if "mended" in answer else []

@@ -9,7 +9,7 @@ from concurrent.futures import CancelledError, Future
 from concurrent.futures import TimeoutError as TooLate
 from typing import Final
 
-from detent.cell.deeds import Action
+from detent.cell.actions import TimedAction
 from detent.pins import LOW
 from detent.realtime import breaking, verbs
 from detent.realtime.boards.driven import Driven
@@ -362,6 +362,6 @@ class Control:
         return {"mended": mended, **self._now()}
 
 
-def _told(action: Action) -> Json:
+def _told(action: TimedAction) -> Json:
     """An entry of the journal."""
-    return {"at_ns": action.at, "deed": type(action.deed).__name__, **as_json(action.deed)}
+    return {"at_ns": action.at, "deed": type(action.what).__name__, **as_json(action.what)}

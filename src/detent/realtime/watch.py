@@ -16,7 +16,7 @@ from detent.uart import Sent
 
 MOST_EVENTS: Final = 200  # kept
 MOST_SAID: Final = 64  # characters of each unit kept
-MOST_DEEDS: Final = 20_000  # in a journal that forgets
+MOST_ACTIONS: Final = 20_000  # in a journal that forgets
 
 Event = Refused | Cautioned | Powered | StoreImage
 
@@ -81,7 +81,7 @@ class Lately(Log[T]):
 
     __slots__ = ("forgotten", "most")
 
-    def __init__(self, most: int = MOST_DEEDS) -> None:
+    def __init__(self, most: int = MOST_ACTIONS) -> None:
         super().__init__()
         self.most, self.forgotten = most, 0
 

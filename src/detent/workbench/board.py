@@ -1,4 +1,4 @@
-"""The state of a cell as the table that windows show (see `live`), and the deeds that windows may do to it.
+"""The state of a cell as the table that windows show (see `live`), and the actions that windows may do to it.
 
 Keys: ``now begin end pace held why past faster late dropped marks crashed title queue faults branches``; of real pins
 ``real`` (driven, fault, None) ``realwhy slips``; for each unit ``u.UNIT.`` and
@@ -32,7 +32,7 @@ Text = Annotated[str, Field(max_length=4096)]
 
 
 class Board:
-    """Keeps the table of `live` at the state of `bench`, and offers its deeds."""
+    """Keeps the table of `live` at the state of `bench`, and offers its actions."""
 
     def __init__(self, bench: "Bench", live: Live) -> None:
         self._bench, self._live = bench, live
@@ -207,7 +207,7 @@ def _offer(bench: "Bench", live: Live) -> None:
     async def revive() -> None:
         await bench.revive()
 
-    for deed in (pace, faster, slower, step_instruction, step_back, rewind, power, set_switch, set_pin, set_strap,
+    for action in (pace, faster, slower, step_instruction, step_back, rewind, power, set_switch, set_pin, set_strap,
                  place_switch, send, type, withdraw, start, break_on_errors, hold, go, step_event, breaks, mend,
                  take_branch, compare_branch, restart, stop_motors, recover, revive):  # fmt: skip
-        live.offer(deed.__name__, deed)
+        live.offer(action.__name__, action)

@@ -53,8 +53,8 @@ class BenchError(RuntimeError):
 class Bench:
     """A cell in its own process. Make it with `open`.
 
-    Every deed is a coroutine that returns when it is done in the cell; BenchError says why it is not. A deed while the
-    cell stands in its past drops what lies behind (so does `go`); looking and stepping do not.
+    Every action is a coroutine that returns when it is done in the cell; BenchError says why it is not. An action while
+    the cell stands in its past drops what lies behind (so does `go`); looking and stepping do not.
     """
 
     _mirror: Mirror
@@ -345,7 +345,7 @@ class Bench:
         """The cell stops whenever a unit refuses something."""
         await self._ask("set_break_on_errors", on)
 
-    # -- deeds ---------------------------------------------------------------------------------------------
+    # -- actions ---------------------------------------------------------------------------------------------
 
     async def power(self, unit: str, on: bool) -> None:
         """Switch the supply of a unit."""
@@ -449,13 +449,13 @@ class Bench:
         if self.engine_pid is not None:
             raise BenchError("the cell's process is alive: restart it instead")
         mirror, end = self._mirror, self.state.end
-        deeds, until = (tuple(mirror.deeds), end) if mirror.complete else (tuple(mirror.loaded.values()), 0)
+        actions, until = (tuple(mirror.actions), end) if mirror.complete else (tuple(mirror.loaded.values()), 0)
         self._asked.clear()
         placed = {name: tuple(map(_again, line.endpoints)) for name, line in self.picture.lines.items()}
         for wanted in (one for several in placed.values() for one in several):
             if wanted.kind == "pty" and wanted.where and Path(wanted.where).is_symlink():
                 Path(wanted.where).unlink()  # of the one that is gone; its terminal may be another's by now
-        await self._start(self._order._replace(deeds=deeds, until=until, held=True, placed=placed))
+        await self._start(self._order._replace(actions=actions, until=until, held=True, placed=placed))
         self.crashed = None
         self._call_back()
 
@@ -466,7 +466,7 @@ class Bench:
         """
         find(target)  # what is wrong with it is said while the old one goes on
         before = self._order
-        wanted = before._replace(target=target, straps=(), options=(), deeds=(), until=0)
+        wanted = before._replace(target=target, straps=(), options=(), actions=(), until=0)
         await self.close()
         self._closing, self.crashed = False, None
         self._asked.clear()

@@ -11,9 +11,9 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
+from detent.cell.actions import Action, Release, SetPin
 from detent.cell.build import build
 from detent.cell.cell import Cell
-from detent.cell.deeds import Deed, Release, SetPin
 from detent.cell.delivery import no_store
 from detent.cell.history import History
 from detent.cell.stores import Stores
@@ -65,7 +65,7 @@ class DrivenEngine(Engine):
         self._driven = opened.drive(real, stores)
         self._opening.callback(self._driven.close)
         self._stale: Ns | None = None  # the machine was taken back to before what the second cell has lived through
-        self._taken: deque[Ns] = deque()  # when each deed was done, of those that both cells have
+        self._taken: deque[Ns] = deque()  # when each action was done, of those that both cells have
         self._count = 0  # of those that the machine's cell has, ever
         self._looked: WallNs = 0
         self._driven.on_taken_back = self._taken_back
@@ -150,7 +150,7 @@ class DrivenEngine(Engine):
             until = min(history.now + SLICE, certain)
             if action is not None and action.at <= until:
                 history.run_to(action.at)
-                history.do(action.deed)
+                history.do(action.what)
                 self._taken.append(action.at)
                 self._count += 1
                 action = next(waiting, None)
@@ -179,7 +179,7 @@ class DrivenEngine(Engine):
         return RealState(standing.value, why, sum(axis.slips for axis in axes), sum(axis.stops for axis in axes))
 
     def _news(self, news: News) -> None:
-        kind = "deed" if news.weight is Weight.NOTE else "error"
+        kind = "action" if news.weight is Weight.NOTE else "error"
         self._marks.append(Mark(news.at, kind, "", news.text))
         self._quiet = False
 
@@ -247,16 +247,16 @@ class DrivenEngine(Engine):
         if factor != 1:
             raise ValueError(NOT_REAL)
 
-    def _do(self, deed: Deed, unit: str = "", text: str = "") -> None:
+    def _do(self, action: Action, unit: str = "", text: str = "") -> None:
         if self.history.past or self.history.stopped:
             raise ValueError("you are looking back: go to the present first, where the machine is")
-        if isinstance(deed, (SetPin, Release)) and (deed.unit, deed.pin) in self._boards.inputs:
-            raise ValueError(f"{deed.unit}.{deed.pin} is an input of a board; its level is that of the pin")
-        deed.do(self._driven.cell)
+        if isinstance(action, (SetPin, Release)) and (action.unit, action.pin) in self._boards.inputs:
+            raise ValueError(f"{action.unit}.{action.pin} is an input of a board; its level is that of the pin")
+        self._driven.cell.do(action)
         self._driven.run_to(self._driven.now)
         self._quiet = False
         if text:
-            self._marks.append(Mark(self.now, "deed", unit, text))
+            self._marks.append(Mark(self.now, "action", unit, text))
 
     _VERBS: ClassVar[dict[str, Callable[..., object]]] = {
         **Engine._VERBS,  # noqa: SLF001 (of its own kind)

@@ -14,8 +14,21 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 from detent.assembler import ImageError
+from detent.cell.actions import (
+    Action,
+    Break,
+    Load,
+    Mend,
+    PlaceSwitch,
+    Power,
+    Release,
+    Send,
+    SetPin,
+    SetSwitch,
+    Start,
+    Type,
+)
 from detent.cell.cell import Cell
-from detent.cell.deeds import Break, Deed, Load, Mend, PlaceSwitch, Power, Release, Send, SetPin, SetSwitch, Start, Type
 from detent.cell.description import Description, Problem
 from detent.cell.history import Broken, History
 from detent.cell.recording import Entry
@@ -105,7 +118,7 @@ class Engine:
             self._loop = Loop(self, self._pace, endpoints, patience=patience, companion=self._companion())
             opening.callback(self._loop.close)
             self._again()
-            if order.held or order.deeds:
+            if order.held or order.actions:
                 self.hold()
             self._cleanup = opening.pop_all()
         self._tell_all()
@@ -152,10 +165,10 @@ class Engine:
 
     def _again(self) -> None:
         """What an engine before this one has done is done again."""
-        for action in self._order.deeds:
+        for action in self._order.actions:
             self.history.run_to(action.at)
             with contextlib.suppress(*WRONG):  # as it was then
-                self.history.do(action.deed)
+                self.history.do(action.what)
         self.history.run_to(self._order.until)
 
     def _made_pace(self) -> Pace:
@@ -252,8 +265,8 @@ class Engine:
             at = news.cut.at
             self._marks = [mark for mark in self._marks if mark.at <= at]
             self._pipe.push(news.cut)
-        if news.batches or news.deeds or found:
-            self._pipe.push(Happened(news.first, news.batches, news.deeds, found, history.first_batch))
+        if news.batches or news.actions or found:
+            self._pipe.push(Happened(news.first, news.batches, news.actions, found, history.first_batch))
         begin = history.begin
         marks = tuple(mark for mark in self._marks if mark.at >= begin)[-MOST_MARKS:]
         if marks != self._told_marks:
@@ -390,7 +403,7 @@ class Engine:
         """Whether it stops at errors."""
         self.history.break_on_errors = on
 
-    # -- verbs: deeds ------------------------------------------------------------------------------------
+    # -- verbs: actions ------------------------------------------------------------------------------------
 
     def power(self, unit: str, on: bool) -> None:
         """Switch a supply; it is marked when it happens."""
@@ -481,11 +494,11 @@ class Engine:
             self.hold()
         self._tell_all()
 
-    def _do(self, deed: Deed, unit: str = "", text: str = "") -> None:
-        self.history.do(deed)
+    def _do(self, action: Action, unit: str = "", text: str = "") -> None:
+        self.history.do(action)
         self._quiet = False
         if text:
-            self._marks.append(Mark(self.now, "deed", unit, text))
+            self._marks.append(Mark(self.now, "action", unit, text))
         if self._pace.held:
             self._pace.hold(self.now)
 

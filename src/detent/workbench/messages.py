@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
-from detent.cell.deeds import Action
+from detent.cell.actions import TimedAction
 from detent.cell.history import Cut
 from detent.cell.recording import Batch
 from detent.motors.rotor import Floats
@@ -189,7 +189,7 @@ class Mark(NamedTuple):
     """A mark on the time line."""
 
     at: Ns
-    kind: str  # error, caution, power, deed, breakpoint, stored
+    kind: str  # error, caution, power, action, breakpoint, stored
     unit: str  # "" where it is the whole cell's
     text: str
 
@@ -237,7 +237,7 @@ class State(NamedTuple):
 
     @property
     def past(self) -> bool:
-        """Whether the cell stands before the end of what has happened. `go`, or any deed, drops what lies behind."""
+        """Whether the cell stands before the end of what has happened. `go`, or any action, drops what lies behind."""
         return self.now < self.end
 
 
@@ -257,7 +257,7 @@ class Order(NamedTuple):
     line_timing: bool
     state_dir: Path | None
     held: bool
-    deeds: tuple[Action, ...] = ()  # to be done first, each at its time: those of an engine that is gone
+    actions: tuple[TimedAction, ...] = ()  # to be done first, each at its time: those of an engine that is gone
     until: Ns = 0  # as far as it had come
     memory: int = 512  # MB, about, that everything may take: what is older than fits is dropped
     placed: Mapping[str, tuple[Wanted, ...]] = {}  # where its lines were served, by name
@@ -289,11 +289,11 @@ class Opened(NamedTuple):
 
 
 class Happened(NamedTuple):
-    """Batches of the recording, in order, the first of them number `first`; deeds; what rotors did."""
+    """Batches of the recording, in order, the first of them number `first`; actions; what rotors did."""
 
     first: int
     batches: Sequence[Batch]
-    deeds: Sequence[Action]
+    actions: Sequence[TimedAction]
     rotors: Mapping[str, Floats]  # rows of `rotors`, by motor
     kept: int  # batches before this one are no longer needed
 

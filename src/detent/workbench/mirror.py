@@ -10,7 +10,7 @@ from math import nan
 from typing import Final
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.deeds import Action, Load
+from detent.cell.actions import Load, TimedAction
 from detent.cell.history import Cut
 from detent.cell.recording import Batch, Entry, InputSet, Received, Recording, Span
 from detent.controllers.device import DriveSet, Powered, Refused, StageSet
@@ -25,7 +25,7 @@ from detent.workbench.columns import Changes, Rows
 from detent.workbench.messages import Happened, Opened
 
 MOST_ROWS: Final = 1_000_000  # of a rotor: most of a minute of motion
-MOST_DEEDS: Final = 200_000  # with more, they cannot be done again
+MOST_ACTIONS: Final = 200_000  # with more, they cannot be done again
 SLACK: Final = 4  # what is no longer needed is forgotten when it is so many-th of everything
 
 _MOTION = (MotionStarted, MotionCut, MotionEnded)
@@ -205,9 +205,9 @@ class Mirror:
         self.units = [Unit(view, opened.picture.units[view.name].straps) for view in self.views]
         self.by_name = {unit.view.name: unit for unit in self.units}
         self.motors = {name: Rows(rotors.COLUMNS, MOST_ROWS) for name in opened.picture.motors}
-        self.deeds: list[Action] = []
-        self.complete = True  # the deeds are all there ever were
-        self.loaded: dict[str, Action] = {}  # the program that was last loaded, by unit
+        self.actions: list[TimedAction] = []
+        self.complete = True  # the actions are all there ever were
+        self.loaded: dict[str, TimedAction] = {}  # the program that was last loaded, by unit
         self.until: Ns = 0  # of what is told
         self.cuts = 0
         self.said: list[tuple[int, Sent | Received]] = []  # every character, with the number of the unit
@@ -227,10 +227,10 @@ class Mirror:
                     self.said.append((unit, entry))
                     self._said_in.append(number)
         self._batches += happened.batches
-        self.deeds += happened.deeds
-        self.loaded |= {action.deed.unit: action for action in happened.deeds if isinstance(action.deed, Load)}
-        if len(self.deeds) > MOST_DEEDS:
-            self.deeds, self.complete = [], False
+        self.actions += happened.actions
+        self.loaded |= {action.what.unit: action for action in happened.actions if isinstance(action.what, Load)}
+        if len(self.actions) > MOST_ACTIONS:
+            self.actions, self.complete = [], False
         for motor, rows in happened.rotors.items():
             self.motors[motor].extend(rows)
         gone = happened.kept - self._first
@@ -241,7 +241,7 @@ class Mirror:
         """The past was changed."""
         del self._batches[cut.batches - self._first :]
         if self.complete:
-            del self.deeds[cut.deeds :]
+            del self.actions[cut.actions :]
         for unit in self.units:
             unit.cut(cut.batches)
         for rows in self.motors.values():

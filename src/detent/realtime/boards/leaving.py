@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.cell.actions import SetPin
 from detent.cell.cell import Cell
-from detent.cell.deeds import SetPin
 from detent.cell.recording import Batch
 from detent.controllers.device import DriveSet, Powered, Stage, StageSet
 from detent.pins import Level, PinSet

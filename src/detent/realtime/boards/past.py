@@ -7,19 +7,19 @@ the same again. The cell keeps its identity: whoever holds it sees it as it is n
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from detent.cell.actions import Action, TimedAction
 from detent.cell.cell import Cell
-from detent.cell.deeds import Action, Deed
 from detent.realtime.watch import Lately
 from detent.ticks import Ns
 
-MOST_DEEDS = 4_000  # kept
+MOST_ACTIONS = 4_000  # kept
 
 
 class Moment(NamedTuple):
     """A cell at one time, and how much its owner had counted up to there."""
 
     cell: Cell
-    deeds: int
+    actions: int
     counts: tuple[int, ...]
 
     @property
@@ -33,7 +33,7 @@ class Past:
 
     def __init__(self, cell: Cell, counts: Callable[[], tuple[int, ...]]) -> None:
         self.cell, self._counts = cell, counts
-        cell.journal, cell.journaling = Lately(MOST_DEEDS), True
+        cell.journal, cell.journaling = Lately(MOST_ACTIONS), True
         self.moments: list[Moment] = []
 
     def keep(self) -> Moment:
@@ -59,29 +59,29 @@ class Past:
     def back(
         self,
         at: Ns,
-        deeds: Sequence[Deed],
-        drop: Callable[[Action], bool],
+        actions: Sequence[Action],
+        drop: Callable[[TimedAction], bool],
         arrived: Callable[[Moment], None],
         lived: Callable[[], None],
     ) -> None:
-        """The cell is as it was at `at`; `deeds` are done there, and then it lives on to its present.
+        """The cell is as it was at `at`; `actions` are done there, and then it lives on to its present.
 
-        What was done to it later is done again, but what is to `drop`. `arrived` is called at `at`, before the deeds,
+        What was done to it later is done again, but what is to `drop`. `arrived` is called at `at`, before the actions,
         with the moment from which it was run, `lived` behind each eventful instant from there on. IndexError where no
         moment is kept that is old enough.
         """
         cell, present = self.cell, self.cell.now
         base = [moment for moment in self.moments if moment.now <= at][-1]
-        actions = _since(cell, base.deeds)
+        since = _since(cell, base.actions)
         vars(cell).update(vars(base.cell.copy()))
-        later = [action for action in actions if action.at > at and not drop(action)]
-        for action in actions:
+        later = [action for action in since if action.at > at and not drop(action)]
+        for action in since:
             if action.at <= at:
                 perform(cell, action)
         cell.run_to(at)
         arrived(base)
         self.moments = [moment for moment in self.moments if moment.now <= at]
-        for action in (*(Action(at, deed) for deed in deeds), *later):
+        for action in (*(TimedAction(at, what) for what in actions), *later):
             _live(cell, action.at, lived)
             perform(cell, action)
             lived()
@@ -95,10 +95,10 @@ def _live(cell: Cell, until: Ns, lived: Callable[[], None]) -> None:
     cell.run_to(until)
 
 
-def perform(cell: Cell, action: Action) -> None:
+def perform(cell: Cell, action: TimedAction) -> None:
     """Do it, at its time, and let everything of that instant happen."""
     cell.run_to(action.at)
-    action.deed.do(cell)
+    cell.do(action.what)
     cell.run_to(cell.now)
 
 
@@ -106,6 +106,6 @@ def _made(cell: Cell) -> int:
     return int(getattr(cell.journal, "forgotten", 0)) + len(cell.journal)
 
 
-def _since(cell: Cell, count: int) -> list[Action]:
+def _since(cell: Cell, count: int) -> list[TimedAction]:
     forgotten = int(getattr(cell.journal, "forgotten", 0))
     return list(cell.journal)[max(count - forgotten, 0) :]

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.deeds import Action, Deed, SetPin
+from detent.cell.actions import Action, SetPin, TimedAction
 from detent.cell.recording import Batch
 from detent.controllers.device import Powered
 from detent.lines.line import Heard
@@ -54,17 +54,17 @@ class TakingBack(Leaving):
         }
         late = {self.plan.inputs[name] for name in others}
         fresh = {(set_.unit, set_.pin) for when, set_, _ in self._reports if when > at}
-        deeds: list[Deed] = []
+        actions: list[Action] = []
         for name, found in others.items():
             place = self.plan.inputs[name]
             if place in fresh or self._given[name] != found:
-                deeds.append(SetPin(*place, found))
+                actions.append(SetPin(*place, found))
                 self._raw[name] = self._given[name] = found
         level = int(event.level)
-        deeds.append(SetPin(unit, pin, level))
+        actions.append(SetPin(unit, pin, level))
         drop = {(when, set_) for when, set_, _ in self._reports if when > at and (set_.unit, set_.pin) in late}
         self._reports = deque((item for item in self._reports if item[:2] not in drop), maxlen=256)
-        self._take_back(axle, at, deeds, lambda action: (action.at, action.deed) in drop, event.shaft)
+        self._take_back(axle, at, actions, lambda action: (action.at, action.what) in drop, event.shaft)
         self._raw[event.input], self._given[event.input] = int(event.present), level
         if int(event.present) != level:
             self._give(event.input, int(event.present), self.clock())
@@ -81,9 +81,9 @@ class TakingBack(Leaving):
         return axle.singles >= MOST_SINGLES
 
     def _take_back(
-        self, stopped: Axle, at: Ns, deeds: Sequence[Deed], drop: Callable[[Action], bool], shaft: int
+        self, stopped: Axle, at: Ns, actions: Sequence[Action], drop: Callable[[TimedAction], bool], shaft: int
     ) -> None:
-        """The cell lives on from `at`, where `deeds` are done; tell the boards only what is different."""
+        """The cell lives on from `at`, where `actions` are done; tell the boards only what is different."""
         self.on_taken_back(at)
         motions: dict[str, list[Motion]] = {}
         levels: dict[str, list[tuple[Ns, bool]]] = {}
@@ -125,7 +125,7 @@ class TakingBack(Leaving):
             met.update(self._cuts(stopped))
 
         self._stores.count = [m for m in self.past.moments if m.now <= at][-1].counts[-1]
-        self.past.back(at, deeds, drop, arrived, lived)
+        self.past.back(at, actions, drop, arrived, lived)
         self._take(self._batches(), tell=False)
         heard: list[list[Heard]] = [self.cell.lines[number].take() for number in range(len(self.lines))]
         for line, count, new in zip(self.lines, counts[len(self.axles) :], heard, strict=True):

@@ -21,11 +21,11 @@ part("begin", (box) => {
     return made;
   }
 
-  function button(name, text, deed, help) {
+  function button(name, text, action, help) {
     const made = element("button", name, text);
     made.type = "button";
     if (help) made.dataset.help = help;
-    made.addEventListener("click", deed);
+    made.addEventListener("click", action);
     return made;
   }
 

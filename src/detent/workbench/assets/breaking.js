@@ -1,6 +1,6 @@
 // The panel "Break it" of the page Cell: a fault is chosen and set; those that stand are mended with a click.
 
-const { part, on, deed, call, toast } = window.detent;
+const { part, on, action, call, toast } = window.detent;
 
 part("breaking", (box) => {
   const kinds = JSON.parse(box.dataset.kinds);
@@ -56,7 +56,7 @@ part("breaking", (box) => {
       mend.className = "key small";
       mend.textContent = "Mend";
       mend.setAttribute("aria-label", `Mend ${words}`);
-      mend.addEventListener("click", () => deed("mend", number));
+      mend.addEventListener("click", () => action("mend", number));
       item.append(what, mend);
       return item;
     }));
@@ -68,5 +68,5 @@ part("broken", (chip) => on("faults", (key, value) => {
   chip.hidden = !count;
   chip.textContent = count === 1 ? "1 fault: mend" : `${count} faults: mend`;
   chip.dataset.help = `${(value || []).map(([, words]) => words).join("\n")}\nClick: mend all of it`;
-  chip.onclick = () => deed("mend", null);
+  chip.onclick = () => action("mend", null);
 }));

@@ -1,6 +1,6 @@
 // The moving parts of the page Cell: dials, slides with their switches, inputs under a hand, command lines.
 
-const { part, on, get, deed, call, toast, onTheme, theme, grouped } = window.detent;
+const { part, on, get, action, call, toast, onTheme, theme, grouped } = window.detent;
 
 // -- dials ----------------------------------------------------------------------------------------------
 
@@ -144,7 +144,7 @@ part("slide", (box) => {
     const drop = async () => {
       if (!held || held[0] !== name) return;
       const put = held;
-      if (put[1] !== get(`s.${name}.low`) || put[2] !== get(`s.${name}.high`)) await deed("place_switch", ...put);
+      if (put[1] !== get(`s.${name}.low`) || put[2] !== get(`s.${name}.high`)) await action("place_switch", ...put);
       held = null;
       plan();
     };
@@ -157,7 +157,7 @@ part("slide", (box) => {
       const by = { ArrowLeft: -1, ArrowRight: 1, PageDown: -10, PageUp: 10 }[event.key];
       if (!by) return;
       event.preventDefault();
-      deed("place_switch", name, ...moved(name, by * (facts.whole ? 1 : (high - low) / 1000)));
+      action("place_switch", name, ...moved(name, by * (facts.whole ? 1 : (high - low) / 1000)));
     });
   }
 
@@ -185,7 +185,7 @@ part("input-pin", (button) => {
   const held = () => (get(`u.${unit}.hand`) || []).includes(pin);
   button.addEventListener("click", () => {
     const level = get(`u.${unit}.pin.${pin}`);
-    deed("set_pin", unit, pin, held() ? null : level ? 0 : 1);
+    action("set_pin", unit, pin, held() ? null : level ? 0 : 1);
   });
   const key = `u.${unit}.hand`;
   return on(key, (changed) => {

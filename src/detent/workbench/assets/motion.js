@@ -21,7 +21,7 @@ class Motion {
     this.number = 0;
     for (const tab of root.querySelectorAll("[data-unit]")) tab.addEventListener("click", () => this.show(tab));
     for (const key of root.querySelectorAll("[data-key]"))
-      key.addEventListener("click", () => this.deeds[key.dataset.key]());
+      key.addEventListener("click", () => this.actions[key.dataset.key]());
     this.form.addEventListener("input", (event) => this.formChanged(event.target.name));
     this.form.addEventListener("submit", (event) => event.preventDefault());
     this.unTheme = detent.onTheme(() => Object.values(this.charts).forEach((chart) => chart.paint()));
@@ -337,7 +337,7 @@ class Motion {
 
   /* -- keys ---------------------------------------------------------------------------------------------------- */
 
-  get deeds() {
+  get actions() {
     const tell = (text) => {
       this.find(".motion-told").textContent = text;
     };

@@ -32,7 +32,7 @@ class Program {
     for (const tab of root.querySelectorAll("[data-unit]"))
       tab.addEventListener("click", () => this.show(tab.dataset.unit));
     for (const key of root.querySelectorAll("[data-key]"))
-      key.addEventListener("click", () => this.deeds[key.dataset.key]());
+      key.addEventListener("click", () => this.actions[key.dataset.key]());
     find("[value=cancel]").addEventListener("click", () => this.at.dialog.close());
   }
 
@@ -43,13 +43,13 @@ class Program {
       moved: () => {},
       placed: (line) => this.placed(line),
       keys: {
-        "Mod-s": () => this.deeds.save(),
-        "Mod-Enter": () => (this.facts.language ? this.deeds.run() : this.deeds.send()),
-        F8: () => this.deeds.go(),
-        F9: () => this.deeds.break(),
-        F10: () => this.deeds.step(),
-        "Shift-F10": () => this.deeds.back(),
-        F4: () => this.deeds.cursor(),
+        "Mod-s": () => this.actions.save(),
+        "Mod-Enter": () => (this.facts.language ? this.actions.run() : this.actions.send()),
+        F8: () => this.actions.go(),
+        F9: () => this.actions.break(),
+        F10: () => this.actions.step(),
+        "Shift-F10": () => this.actions.back(),
+        F4: () => this.actions.cursor(),
       },
     });
     const units = [...this.root.querySelectorAll("[data-unit]")].map((tab) => tab.dataset.unit);
@@ -67,7 +67,7 @@ class Program {
       const name = control && event.key.toLowerCase() === "s" ? "save" : control ? null : KEYS[(event.shiftKey ? "Shift-" : "") + event.key];
       if (!name) return;
       event.preventDefault();
-      if (!event.repeat || name === "step" || name === "back") this.deeds[name]();
+      if (!event.repeat || name === "step" || name === "back") this.actions[name]();
     };
     document.addEventListener("keydown", pressed);
     return () => document.removeEventListener("keydown", pressed);
@@ -305,7 +305,7 @@ class Program {
 
   /* -- what the keys do ------------------------------------------------------------------------------------------- */
 
-  get deeds() {
+  get actions() {
     const { facts, editor } = this,
       unit = facts && facts.unit;
     const load = async (start) => {
@@ -394,7 +394,7 @@ class Program {
     this.name();
   }
 
-  async chooseFile(title, word, deed) {
+  async chooseFile(title, word, action) {
     const names = await this.ask("files", []);
     if (!names) return;
     const { dialog } = this.at,
@@ -433,7 +433,7 @@ class Program {
     form.onsubmit = async (event) => {
       event.preventDefault();
       if (!name.value) return;
-      const done = await deed(name.value, over === name.value);
+      const done = await action(name.value, over === name.value);
       if (typeof done === "string") {
         over = name.value;
         asks.textContent = done;

@@ -3,7 +3,7 @@
 
 let CM = null;
 
-/* The editor in `place`. `told` has changed(text), breakpoints(lines), runTo(line), keys {key: deed}. */
+/* The editor in `place`. `told` has changed(text), breakpoints(lines), runTo(line), keys {key: action}. */
 export async function makeEditor(place, told) {
   await prepare();
   return new Editor(place, told);
@@ -148,16 +148,16 @@ class Editor {
       if (update.docChanged) this.told.changed(!this.quiet);
       if (update.selectionSet || update.docChanged) this.told.moved && this.told.moved();
     });
-    const deeds = Object.entries(this.told.keys || {}).map(([key, deed]) => ({
+    const actions = Object.entries(this.told.keys || {}).map(([key, action]) => ({
       key,
       run: () => {
-        deed();
+        action();
         return true;
       },
       preventDefault: true,
     }));
     return [
-      CM.Prec.high(CM.keymap.of(deeds)),
+      CM.Prec.high(CM.keymap.of(actions)),
       this.addresses.field,
       this.breakpoints.field,
       this.errors.field,

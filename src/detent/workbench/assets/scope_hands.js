@@ -143,7 +143,7 @@ export class Hands {
       const { view, plot } = this.scope;
       return plot.t(view, this.hover === null ? plot.width / 2 : this.hover);
     };
-    const deeds = {
+    const actions = {
       ArrowLeft: () => this.pan(-0.15),
       ArrowRight: () => this.pan(0.15),
       ArrowUp: () => this.zoom(1 / ZOOM),
@@ -156,10 +156,10 @@ export class Hands {
       b: () => this.scope.moveCursor(1, place()),
       Escape: () => this.scope.dropCursors(),
     };
-    const deed = deeds[event.key];
-    if (!deed) return;
+    const action = actions[event.key];
+    if (!action) return;
     event.preventDefault();
     event.stopPropagation();
-    deed();
+    action();
   }
 }

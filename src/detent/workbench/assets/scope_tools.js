@@ -16,10 +16,10 @@ export function element(tag, attributes = {}, ...children) {
   return made;
 }
 
-const key = (label, help, deed, more = {}) =>
+const key = (label, help, action, more = {}) =>
   element(
     "button",
-    { type: "button", class: "key small", "aria-label": help, "data-help": help, onclick: deed, ...more },
+    { type: "button", class: "key small", "aria-label": help, "data-help": help, onclick: action, ...more },
     label,
   );
 

@@ -2,7 +2,7 @@
 
 const { part, on, frame, call, toast, seconds, get } = window.detent;
 
-const COLOURS = { error: "#ff6b5e", caution: "#ffd84d", power: "#ffb02e", deed: "#7fe3d0", breakpoint: "#ff8ad0", stored: "#8fb8ff" };
+const COLOURS = { error: "#ff6b5e", caution: "#ffd84d", power: "#ffb02e", action: "#7fe3d0", breakpoint: "#ff8ad0", stored: "#8fb8ff" };
 const LEFT = 10; // px of air at both ends
 const NICE = [1, 2, 5];
 

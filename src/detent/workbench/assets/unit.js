@@ -22,9 +22,9 @@ part("unit", (box) => {
 
   const names = () => get("r.names") || [];
   const now = () => (chosen === null ? null : get(`r.${chosen}`));
-  const tried = async (deed) => {
+  const tried = async (action) => {
     try {
-      return await deed();
+      return await action();
     } catch (error) {
       toast(error.message, "error");
       return undefined;
@@ -39,10 +39,10 @@ part("unit", (box) => {
   }
 
   /** The first click asks, the second within three seconds does it. */
-  function sure(button, why, deed) {
+  function sure(button, why, action) {
     if (armed && armed.button === button) {
       disarm();
-      deed();
+      action();
       return;
     }
     disarm();

@@ -64,7 +64,7 @@ function connected() {
 }
 
 /** The same for a hand at the page: an error is shown, and nothing is thrown. */
-async function deed(name, ...args) {
+async function action(name, ...args) {
   try {
     return await call(name, ...args);
   } catch (error) {
@@ -278,7 +278,7 @@ function toast(text, kind = "note") {
   setTimeout(() => one.remove(), kind === "error" ? 9000 : 4000);
 }
 
-// -- deeds by hand --------------------------------------------------------------------------------------
+// -- actions by hand --------------------------------------------------------------------------------------
 
 function argument(written) {
   if (typeof written !== "string") return written;
@@ -287,11 +287,11 @@ function argument(written) {
   return written;
 }
 
-function listenForDeeds() {
+function listenForActions() {
   document.addEventListener("click", (event) => {
     const element = event.target.closest("[data-do]");
     if (!element || element.disabled) return;
-    deed(element.dataset.do, ...JSON.parse(element.dataset.args || "[]").map(argument));
+    action(element.dataset.do, ...JSON.parse(element.dataset.args || "[]").map(argument));
   });
   document.addEventListener("click", (event) => {
     // a pointer does not leave the focus at a button or tab, where the next space would press it once more
@@ -300,7 +300,7 @@ function listenForDeeds() {
   document.addEventListener("keydown", (event) => {
     if (event.key !== "F8" || event.defaultPrevented || event.ctrlKey || event.altKey || event.shiftKey) return;
     event.preventDefault(); // wherever the focus is
-    if (!event.repeat) deed(values.get("held") ? "go" : "hold");
+    if (!event.repeat) action(values.get("held") ? "go" : "hold");
   });
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -310,10 +310,10 @@ function listenForDeeds() {
     if (event.key === " ") {
       if (at.closest("button, a, summary")) return; // it is theirs
       event.preventDefault();
-      deed(values.get("held") ? "go" : "hold");
+      action(values.get("held") ? "go" : "hold");
     } else if (event.key in keys) {
       event.preventDefault();
-      if (!event.repeat || event.key === "." || event.key === ",") deed(keys[event.key]);
+      if (!event.repeat || event.key === "." || event.key === ",") action(keys[event.key]);
     } else if (event.key === "?") {
       document.dispatchEvent(new CustomEvent("detent-tour"));
     } else if (/^[1-9]$/.test(event.key)) {
@@ -406,11 +406,11 @@ function followTabs() {
       }
       clearTimeout(armed);
       rest();
-      deed("restart");
+      action("restart");
     });
   });
   part("pace", (select) => {
-    select.addEventListener("change", () => deed("pace", select.value === "max" ? null : Number(select.value)));
+    select.addEventListener("change", () => action("pace", select.value === "max" ? null : Number(select.value)));
     return on("pace", (key, value) => {
       if (key !== "pace") return;
       const text = value === null ? "max" : String(value);
@@ -425,7 +425,7 @@ function followTabs() {
 }
 
 window.detent = {
-  part, on, frame, call, deed, toast, onTheme, theme, remembered, remember, seconds, grouped,
+  part, on, frame, call, action, toast, onTheme, theme, remembered, remember, seconds, grouped,
   get: (key) => values.get(key),
   keys: () => values.keys(),
   forms: FORMS,
@@ -435,7 +435,7 @@ darkOutside.addEventListener("change", applyTheme);
 addEventListener("load", applyTheme);
 applyTheme();
 listenForHelp();
-listenForDeeds();
+listenForActions();
 followTabs();
 on("real", (key, value) => {
   if (key === "real") document.documentElement.dataset.real = value ?? "";

@@ -138,10 +138,10 @@ class Units:
                 await other.break_off()
         return await unit.stop()
 
-    async def _shown(self, unit: Unit, deed: Awaitable[object]) -> list[str]:
+    async def _shown(self, unit: Unit, action: Awaitable[object]) -> list[str]:
         """Do it; the lines that were sent meanwhile."""
         begin = unit.tap.transcript.next()
-        await deed
+        await action
         questions = unit.tap.transcript.questions
         rows = [row for row in unit.tap.transcript.since(begin).rows if row.number not in questions]
         return [
