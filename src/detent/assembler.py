@@ -9,7 +9,8 @@ command; a comment runs from the language's comment character to the end of the 
 wherever the language takes an address. Label names are a letter or underscore followed by letters,
 figures and underscores; upper and lower case differ.
 
-A source in error raises `AssemblyFailed`, which holds every error, not only the first.
+A source in error raises `AssemblyFailed`, which holds every error, not only the first; of very many the first hundred.
+Work and report grow no faster than the source, and what cannot be the source of a program is refused unread.
 """
 
 import difflib
@@ -25,6 +26,13 @@ NAME: Final = re.compile("[A-Za-z_][A-Za-z0-9_]*")
 _LABEL: Final = re.compile(r"\s*([^\s:]+)\s*:")
 _WORD: Final = re.compile("[A-Za-z_]{3}[A-Za-z0-9_]*")
 _LINE_END: Final = re.compile(r"\r\n|\r|\n")
+
+LONGEST_SOURCE: Final = 1 << 18  # characters: a memory of 2 048 bytes with a hundred characters of comment to each
+LONGEST_LINE: Final = 1000  # characters without the comment
+LONGEST_LABEL: Final = 80  # characters
+MOST_ERRORS: Final = 100
+_MOST_COMPARED: Final = 1_000  # labels, while looking for those that an unknown one is similar to
+_SHOWN: Final = 160  # characters of a wrong line, on either side of the column
 
 
 class StatementError(Exception):
@@ -118,21 +126,25 @@ class SourceError(NamedTuple):
 
 
 class AssemblyFailed(Exception):
-    """A source with errors, all of them in the order of its lines. Its text is the report for a person."""
+    """A source with errors, the first `MOST_ERRORS` of them in the order of its lines. Its text is for a person."""
 
     def __init__(self, name: str, lines: tuple[str, ...], errors: Iterable[SourceError]) -> None:
         self.name = name
         self.lines = lines
-        self.errors = tuple(sorted(errors))
+        self.errors = tuple(sorted(errors))[:MOST_ERRORS]
         super().__init__("\n".join(self._reports()))
 
     def _reports(self) -> Iterator[str]:
         for line, column, message in self.errors:
+            begin = max(column - 1 - _SHOWN, 0) if column - 1 > 2 * _SHOWN else 0
+            shown = self.lines[line - 1][begin : column - 1 + _SHOWN]
             # a control character in the source, say of an image taken for one, must not reach a terminal
-            source = "".join(c if c.isprintable() or c == "\t" else "?" for c in self.lines[line - 1])
+            source = "".join(c if c.isprintable() or c == "\t" else "?" for c in shown)
             # a tab stays a tab, so that the caret stands under its column however wide tabs are shown
-            margin = re.sub(r"[^\t]", " ", source[: column - 1])
+            margin = re.sub(r"[^\t]", " ", source[: column - 1 - begin])
             yield f"{self.name}:{line}:{column}: {message}\n    {source}\n    {margin}^"
+        if len(self.errors) == MOST_ERRORS:
+            yield f"{self.name}: these are {MOST_ERRORS} errors; mend them, then the rest is looked at"
 
 
 class Placed(NamedTuple, Generic[Ins]):
@@ -238,6 +250,8 @@ class _Assembler(Generic[Ins]):
         self.symbols: dict[str, int] = {}
         self.defined: dict[str, int] = {}  # label -> line
         self.pending: list[str] = []  # labels that wait for their instruction
+        self.behind: frozenset[str] = frozenset()  # those that wait in vain, once everything is read
+        self.compared = 0  # labels, with unknown ones
         self.address = language.areas[0].start
         self.area: range | None = language.areas[0]  # where the present part stands
         self.overflow: tuple[_Line[Ins], range] | None = None  # the first instruction that does not fit
@@ -249,8 +263,13 @@ class _Assembler(Generic[Ins]):
         """Both passes. Raises AssemblyFailed."""
         for number, line in enumerate(self.lines, start=1):
             self.read(number, line.partition(self.language.comment)[0])
-        self.end()
-        self.report_overflow()
+            if len(self.errors) >= MOST_ERRORS:
+                break
+        else:
+            self.end()
+            self.report_overflow()
+        if len(self.errors) >= MOST_ERRORS:
+            raise AssemblyFailed(self.name, self.lines, self.errors)
         aimed = [self.aim(line) for line in self.found]
         if self.errors:
             raise AssemblyFailed(self.name, self.lines, self.errors)
@@ -268,6 +287,12 @@ class _Assembler(Generic[Ins]):
 
     def read(self, number: int, text: str) -> None:
         """First pass over one line without its comment."""
+        if len(text) > LONGEST_LINE:
+            self.certain = False
+            self.settle()
+            told = f"a line of {len(text)} characters is too long: at most {LONGEST_LINE} without the comment"
+            self.wrong(number, 1, f"{told}; one command a line")
+            return
         start = 0
         while match := _LABEL.match(text, start):
             self.label(match[1], number, match.start(1) + 1)
@@ -280,7 +305,7 @@ class _Assembler(Generic[Ins]):
             parsed = self.language.parse(statement)
         except StatementError as error:
             self.certain = False
-            self.pending.clear()
+            self.settle()
             hint = f"; if it is a label, write {statement}:" if _WORD.fullmatch(statement) else ""
             self.wrong(number, column + error.offset, error.message + hint)
             return
@@ -305,19 +330,24 @@ class _Assembler(Generic[Ins]):
         if not NAME.fullmatch(name):
             rule = "a letter or _, then letters, figures and _"
             self.wrong(line, column, f"{name!r} is no name for a label: it takes {rule}")
+        elif len(name) > LONGEST_LABEL:
+            self.wrong(line, column, f"a label of {len(name)} characters is too long; at most {LONGEST_LABEL}")
         elif name in self.defined:
             first = self.defined[name]
             self.wrong(line, column, f"label {name} is defined twice, first on line {first}; rename one")
         else:
             self.defined[name] = line
-            self.symbols[name] = self.address
             self.pending.append(name)
+
+    def settle(self) -> None:
+        """The labels that wait name the present address."""
+        self.symbols.update(dict.fromkeys(self.pending, self.address))
+        self.pending.clear()
 
     def move_to(self, origin: int, line: int, column: int) -> None:
         """The next instruction stands at `origin`."""
         self.report_overflow()
         self.address = origin
-        self.symbols.update(dict.fromkeys(self.pending, origin))
         self.area = next((area for area in self.language.areas if origin in area), None)
         if self.area is None:
             room = ", ".join(f"{area.start}-{area.stop - 1}" for area in self.language.areas)
@@ -325,7 +355,7 @@ class _Assembler(Generic[Ins]):
 
     def place(self, line: _Line[Ins]) -> None:
         """Put an instruction at the present address."""
-        self.pending.clear()
+        self.settle()
         self.found.append(line)
         self.address = line.address + line.length
         for byte in range(line.address, self.address):
@@ -343,6 +373,8 @@ class _Assembler(Generic[Ins]):
         led = {line.statement.label for line in self.found}
         label = next((label for label in self.pending if label in led), None)
         if label is None or ending is None:
+            self.behind = frozenset(self.pending)
+            self.settle()
             return
         number = self.defined[label]
         column = self.lines[number - 1].index(label) + 1
@@ -365,6 +397,8 @@ class _Assembler(Generic[Ins]):
 
     def aim(self, line: _Line[Ins]) -> Ins:
         """Second pass over one instruction: its address argument checked, its label resolved."""
+        if len(self.errors) >= MOST_ERRORS:
+            return line.instruction
         label = line.statement.label
         if label is None:
             target = self.language.target(line.instruction)
@@ -374,7 +408,7 @@ class _Assembler(Generic[Ins]):
         column = line.column + line.statement.label_offset
         if label not in self.symbols:
             self.wrong(line.number, column, f"no label {label} is defined{self.similar(label)}")
-        elif label in self.pending and self.language.closed:
+        elif label in self.behind and self.language.closed:
             behind = f"label {label} stands behind the last instruction, where there is nothing to jump to"
             self.wrong(line.number, column, f"{behind}; put an instruction behind it")
         else:
@@ -386,7 +420,9 @@ class _Assembler(Generic[Ins]):
 
     def similar(self, label: str) -> str:
         """The remedy for an unknown label."""
-        close = difflib.get_close_matches(label, self.symbols, n=1)
+        self.compared += len(self.symbols)
+        near = self.symbols if self.compared <= _MOST_COMPARED and len(label) <= LONGEST_LABEL else ()
+        close = difflib.get_close_matches(label, near, n=1)
         return f"; did you mean {close[0]}?" if close else f"; write {label}: before an instruction"
 
     def check_target(self, line: _Line[Ins], target: int) -> None:
@@ -409,7 +445,11 @@ def assemble(language: Language[Ins], source: str, name: str = "program") -> Ass
 
     The ^Z with which tools of DOS end a file is no part of it.
     """
-    return _Assembler(language, re.sub(r"\x1a+\s*\Z", "", source), name).run()
+    if len(source) > LONGEST_SOURCE:
+        told = f"{len(source)} characters are too many: at most {LONGEST_SOURCE}; leave out what is no program"
+        raise AssemblyFailed(name, (source[:_SHOWN].split("\n")[0],), [SourceError(1, 1, told)])
+    text = source.rstrip()
+    return _Assembler(language, text.rstrip("\x1a") if text.endswith("\x1a") else source, name).run()
 
 
 def listing(assembly: Assembly[Ins]) -> str:

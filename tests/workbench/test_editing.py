@@ -1,12 +1,14 @@
 """The calls of the Program page."""
 
 import asyncio
+import threading
 from collections.abc import Awaitable, Callable, Iterable
 from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import pytest
 
+from detent.workbench import programs
 from detent.workbench.editing import Editing
 from detent.workbench.live import Live
 from detent.workbench.programs import Program
@@ -154,3 +156,21 @@ def test_breakpoints_are_shown_to_all_windows(bench: Bench) -> None:
 def test_an_unknown_unit_is_an_error_in_words(editing: Editing) -> None:
     with pytest.raises(ValueError, match="no unit 'bra'"):
         run(editing.check("bra", ""))
+
+
+def test_no_text_is_assembled_on_the_loop_of_the_pages(
+    editing: Editing, bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads = set()
+
+    def watched(*given: Any) -> Any:
+        threads.add(threading.get_ident())
+        return assemble(*given)
+
+    assemble = programs.assemble
+    monkeypatch.setattr(programs, "assemble", watched)
+    run(editing.check("bar", SOURCE))
+    run(editing.load("bar", SOURCE, False))
+    run(editing.compare("bar", SOURCE, False))
+    assert threads
+    assert threading.get_ident() not in threads

@@ -4,6 +4,7 @@ Everything is a call that a window makes (see `live`); texts and answers are pla
 are in `filing`.
 """
 
+import asyncio
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
@@ -75,7 +76,7 @@ class Editing:
 
     async def check(self, unit: Name, text: Text) -> dict[str, object]:
         """Errors, addresses and labels of a text, and whether it is what program memory holds."""
-        checked = self._program(unit).check(text)
+        checked = await asyncio.to_thread(self._program(unit).check, text)
         return {
             "errors": [[wrong.line, wrong.column, wrong.length, wrong.message] for wrong in checked.errors],
             "places": [[line, place.address, len(place.code)] for line, place in checked.places.items()],
@@ -87,7 +88,7 @@ class Editing:
 
     async def load(self, unit: Name, text: Text, start: bool) -> str:
         """Put a text into program memory, and start it if wanted. What came of it, in words."""
-        checked = self._sound(unit, text)
+        checked = await self._sound(unit, text)
         await self._bench.load(unit, checked.image, checked.base)
         if start:
             await self._bench.start(unit)
@@ -99,9 +100,9 @@ class Editing:
 
     async def compare(self, unit: Name, text: Text, kept: bool) -> dict[str, object]:
         """Read memory back (`kept`: what is kept without supply): the lines that differ, and words for it."""
-        checked = self._sound(unit, text)
+        checked = await self._sound(unit, text)
         image = await self._bench.read_back(unit, kept=kept)
-        lines = self._program(unit).differences(text, image)
+        lines = await asyncio.to_thread(self._program(unit).differences, text, image)
         where = "what is kept without supply" if kept else "program memory"
         if not lines and self._holds_all(unit, checked, image):
             return {"lines": [], "words": f"{where} holds just this program", "same": True}
@@ -123,9 +124,9 @@ class Editing:
         except ImageError as error:
             raise ValueError(str(error)) from None
 
-    def _sound(self, unit: str, text: str) -> Checked:
-        """The text assembled. ValueError with its first error."""
-        checked = self._program(unit).check(text)
+    async def _sound(self, unit: str, text: str) -> Checked:
+        """The text assembled, beside the loop. ValueError with its first error."""
+        checked = await asyncio.to_thread(self._program(unit).check, text)
         if checked.errors:
             first, more = checked.errors[0], len(checked.errors) - 1
             others = f" ({more} more)" if more else ""

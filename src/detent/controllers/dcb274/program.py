@@ -115,8 +115,7 @@ class SmcLanguage:
         row = commands.LETTERS.get(text[0])
         if row is None:
             return text, None, 0
-        for match in re.finditer(r"[^ ,]+", text[1:]):
-            place = len(re.findall(r"[^ ,]+", text[1 : 1 + match.start()]))
+        for place, match in enumerate(re.finditer(r"[^ ,]+", text[1:])):
             takes = place < len(row.arguments) and isinstance(row.arguments[place], Address)
             if takes and LABEL_NAME.fullmatch(match[0]):
                 return f"{text[: 1 + match.start()]}0{text[1 + match.end() :]}", match[0], 1 + match.start()
@@ -173,7 +172,7 @@ class SmcLanguage:
                 address += 1
                 continue
             instruction = decode(image[address : address + LONGEST])
-            if instruction is None or not _typed(instruction, image[address:]):
+            if instruction is None or not _typed(instruction, image, address):
                 raise Damaged(f"byte {address} holds {image[address]:02X}h, with which no instruction begins")
             found.append((address, instruction))
             address += ROWS[instruction.op].length
@@ -190,9 +189,9 @@ class SmcLanguage:
         return " ".join(words)
 
 
-def _typed(instruction: Instruction, image: bytes) -> bool:
-    """Whether a command line gives just the bytes with which `image` begins: raw writes may have made others."""
-    return image.startswith(encode(commands.parse(commands.spell(instruction))))
+def _typed(instruction: Instruction, image: bytes, address: int) -> bool:
+    """Whether a command line gives just the bytes at `address` of `image`: raw writes may have made others."""
+    return image.startswith(encode(commands.parse(commands.spell(instruction))), address)
 
 
 def language() -> Language[Instruction]:
