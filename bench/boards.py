@@ -196,7 +196,7 @@ inputs = { EOT = "^gpio10", HOME = "^gpio11" }
         cell = build(parse(text, "cell.toml"), str, store=stores.save, line_timing=False, inputs=opened.inputs)
         driven = opened.drive(cell, stores)
         opened.begin(driven, Pace(clock=driven.clock))
-        driven.send(0, cell.talker("x").frame("H+"))
+        driven.send(0, cell.serial_unit("x").frame("H+"))
         while driven.rewinds < 2:
             now[0] += 500 * US
             driven.run_to(driven.boards.cell_at(now[0]))

@@ -16,7 +16,7 @@ import pytest
 
 from detent.cell.description import single
 from detent.cli import main
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.service import Service
 
 DETENT = [sys.executable, "-c", "from detent.cli import main; main()", "epics"]
@@ -268,7 +268,7 @@ print(json.dumps(told))
 def test_a_unit_at_a_port_is_moved_too(ioc: Ioc) -> None:
     """Real or emulated is one to the driver: here the port is a pseudo-terminal."""
     environment = {**ioc.environment, "EPICS_CA_SERVER_PORT": str(free_port())}
-    with Service(single("gs-c200s"), lambda file: "", [Wanted("pty")], pace=20) as service:
+    with Service(single("gs-c200s"), lambda file: "", [EndpointSpec("pty")], pace=20) as service:
         serving = threading.Thread(target=service.run)
         serving.start()
         try:

@@ -188,10 +188,10 @@ def test_what_hosts_and_hands_did_happens_again_on_the_way() -> None:
     assert history.panel.fronts[0].levels["UI2"] == 1
     history.rewind(250 * MS)
     assert history.panel.fronts[0].levels["UI2"] == 0
-    assert history.cell.hands == {(0, "UI2"): 0}
+    assert history.cell.forced == {(0, "UI2"): 0}
     history.do(Release("a", "UI2"))
     assert history.panel.fronts[0].levels["UI2"] == 1
-    assert history.cell.hands == {}
+    assert history.cell.forced == {}
 
 
 def test_a_host_hears_nothing_twice_and_nothing_too_little() -> None:

@@ -6,7 +6,7 @@ from tests.realtime.served import address, served
 
 from detent.cli import main
 from detent.realtime.connect import connect
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.finding import Listed
 
 
@@ -69,7 +69,7 @@ def test_the_ports_of_the_computer_are_looked_at_if_none_is_named(
 
 def test_a_port_that_another_client_has_is_told_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     with (
-        served("gs-c200", wanted=[Wanted("tcp", "127.0.0.1:0")]) as service,
+        served("gs-c200", endpoints=[EndpointSpec("tcp", "127.0.0.1:0")]) as service,
         connect("gs-c200", address(service)) as unit,
     ):
         unit.position()

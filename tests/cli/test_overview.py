@@ -24,7 +24,7 @@ def test_it_is_what_cyclopts_prints(columns: int, colour: bool, monkeypatch: pyt
 
 @pytest.mark.parametrize("tokens", [["run", "--help"], ["--version"], ["--install-completion"], ["hlep"]])
 def test_everything_else_is_for_cyclopts(tokens: list[str]) -> None:
-    assert not overview.wanted(tokens)
+    assert not overview.is_asked_for(tokens)
 
 
 def test_what_it_does_not_know_is_for_cyclopts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -33,12 +33,12 @@ def test_what_it_does_not_know_is_for_cyclopts(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(io.BytesIO(), encoding="utf-8"))
-    assert overview.wanted(["--help"])
+    assert overview.is_asked_for(["--help"])
     monkeypatch.setenv("COLUMNS", "40")
-    assert not overview.wanted(["--help"])
+    assert not overview.is_asked_for(["--help"])
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setenv("NO_COLOR", "1")
-    assert not overview.wanted(["--help"])
+    assert not overview.is_asked_for(["--help"])
     monkeypatch.delenv("NO_COLOR")
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(io.BytesIO(), encoding="ascii"))
-    assert not overview.wanted(["--help"])
+    assert not overview.is_asked_for(["--help"])

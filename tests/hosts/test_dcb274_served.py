@@ -11,7 +11,7 @@ from detent.cell.description import parse
 from detent.hosts.dcb274 import AsyncDcb274, BlockingDcb274, Dcb274
 from detent.hosts.errors import MotionFailed
 from detent.realtime.async_ports import open_async_port
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.ports import open_port
 from detent.realtime.service import Service
 
@@ -24,7 +24,7 @@ PARTY = "".join(
 
 @contextmanager
 def served(text: str, pace: int = 20) -> Iterator[str]:
-    with Service(parse(text, "cell"), lambda file: "", [Wanted("pty")], pace=pace) as service:
+    with Service(parse(text, "cell"), lambda file: "", [EndpointSpec("pty")], pace=pace) as service:
         serving = threading.Thread(target=service.run)
         serving.start()
         try:

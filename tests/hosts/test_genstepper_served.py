@@ -11,7 +11,7 @@ from detent.cell.description import parse
 from detent.hosts.axis import Speeds
 from detent.hosts.genstepper import AsyncGenStepper, BlockingGenStepper, GenStepper
 from detent.realtime.async_ports import open_async_port
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.ports import open_port
 from detent.realtime.service import Service
 
@@ -23,7 +23,7 @@ PATIENCE = 20.0  # this computer may be busy
 def served(line_timing: bool = True) -> Iterator[str]:
     """The address of a board, fifty times as fast as real time."""
     description = parse(BOARD, "board")
-    with Service(description, lambda file: "", [Wanted("pty")], pace=50, line_timing=line_timing) as service:
+    with Service(description, lambda file: "", [EndpointSpec("pty")], pace=50, line_timing=line_timing) as service:
         serving = threading.Thread(target=service.run)
         serving.start()
         try:

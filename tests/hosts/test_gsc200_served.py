@@ -9,7 +9,7 @@ from detent.cell.description import parse
 from detent.hosts.axis import Speeds
 from detent.hosts.gsc200 import AsyncGsC200, BlockingGsC200, GsC200
 from detent.realtime.async_ports import open_async_port
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.ports import open_port
 from detent.realtime.service import Service
 
@@ -29,7 +29,7 @@ PATIENCE = 20.0  # this computer may be busy
 @contextmanager
 def served() -> Iterator[str]:
     """The address of the line of two modules, fifty times as fast as real time."""
-    with Service(parse(TWO, "two"), lambda file: "", [Wanted("pty")], pace=50) as service:
+    with Service(parse(TWO, "two"), lambda file: "", [EndpointSpec("pty")], pace=50) as service:
         serving = threading.Thread(target=service.run)
         serving.start()
         try:

@@ -10,7 +10,7 @@ import pytest
 from detent.cell.description import parse
 from detent.hosts.supersigma import AsyncCcu, AsyncSupersigma, BlockingCcu, BlockingSupersigma, Ccu, Supersigma
 from detent.realtime.async_ports import open_async_port
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.ports import open_port
 from detent.realtime.service import Service
 
@@ -27,7 +27,7 @@ units = ["left", "right"]
 
 @contextmanager
 def served(kind: str) -> Iterator[tuple[Service, str]]:
-    wanted = [Wanted("tcp", "127.0.0.1:0")] if kind == "tcp" else [Wanted("pty")]
+    wanted = [EndpointSpec("tcp", "127.0.0.1:0")] if kind == "tcp" else [EndpointSpec("pty")]
     with Service(parse(TWO, "two"), lambda file: "", wanted, pace=50) as service:
         serving = threading.Thread(target=service.run)
         serving.start()

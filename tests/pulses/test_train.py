@@ -338,6 +338,6 @@ def test_a_period_in_fixed_point_is_exact_in_arrays():
 
 def test_a_path_that_is_not_installed_is_refused(monkeypatch):
     monkeypatch.setitem(sys.modules, "numba", None)
-    assert not arrays.dense_wanted(10**9)
+    assert not arrays.goes_to_numba(10**9)
     with pytest.raises(ImportError, match="needs numba, which is not installed"):
         arrays.use("numba")

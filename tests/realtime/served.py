@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from detent.cell.description import Description, single
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.service import Service
 from detent.ticks import SECOND
 
@@ -20,14 +20,14 @@ def served(
     *,
     straps: Mapping[str, str] | None = None,
     options: Mapping[str, str] | None = None,
-    wanted: Sequence[Wanted] = (),
+    endpoints: Sequence[EndpointSpec] = (),
     line_timing: bool = False,
     pace: float = 1.0,
 ) -> Iterator[Service]:
-    """A model, or a cell, that has been on for a second, served by a thread. Characters take no time unless wanted."""
+    """A model, or a cell, that has been on for a second, served by a thread. Characters take no time unless told."""
     if isinstance(what, str):
         what = single(what, straps=dict(straps or {}), options=dict(options or {}))
-    with Service(what, no_file, wanted, line_timing=line_timing, pace=pace) as service:
+    with Service(what, no_file, endpoints, line_timing=line_timing, pace=pace) as service:
         service.cell.run_to(SECOND)
         thread = threading.Thread(target=service.run, daemon=True)
         thread.start()

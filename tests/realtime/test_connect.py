@@ -16,7 +16,7 @@ from detent.hosts.gsc200 import BlockingGsC200
 from detent.hosts.supersigma import BlockingSupersigma
 from detent.realtime.addresses import PortError
 from detent.realtime.connect import HOSTS, connect, connect_async
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 
 KINDS = {
     "gs-c200": BlockingGsC200,
@@ -26,14 +26,14 @@ KINDS = {
     "bs0610": BlockingGenStepper,
     "bs0710": BlockingGenStepper,
 }
-WAYS: Sequence[Wanted] = (
-    Wanted("pty"),
-    Wanted("tcp", "127.0.0.1:0"),
-    Wanted("rfc2217", "127.0.0.1:0"),
+WAYS: Sequence[EndpointSpec] = (
+    EndpointSpec("pty"),
+    EndpointSpec("tcp", "127.0.0.1:0"),
+    EndpointSpec("rfc2217", "127.0.0.1:0"),
 )
 
 
-def written(way: Wanted, where: str) -> str:
+def written(way: EndpointSpec, where: str) -> str:
     return f"rfc2217://{where}" if way.kind == "rfc2217" else where
 
 
@@ -43,8 +43,11 @@ def test_every_model_has_a_driver() -> None:
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.kind)
 @pytest.mark.parametrize("model", KINDS)
-def test_every_model_is_driven_over_every_kind_of_port(model: str, way: Wanted) -> None:
-    with served(model, wanted=[way]) as service, connect(model, written(way, address(service)), patience=10.0) as unit:
+def test_every_model_is_driven_over_every_kind_of_port(model: str, way: EndpointSpec) -> None:
+    with (
+        served(model, endpoints=[way]) as service,
+        connect(model, written(way, address(service)), patience=10.0) as unit,
+    ):
         assert isinstance(unit, KINDS[model])
         unit.move_by(100)
         unit.wait(60.0)
@@ -53,14 +56,14 @@ def test_every_model_is_driven_over_every_kind_of_port(model: str, way: Wanted) 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.kind)
 @pytest.mark.parametrize("model", ["gs-c200s", "dcb-274", "bs0610", "supersigma"])
-def test_coroutines_drive_them_as_well(model: str, way: Wanted) -> None:
+def test_coroutines_drive_them_as_well(model: str, way: EndpointSpec) -> None:
     async def drive(where: str) -> int:
         async with await connect_async(model, where, patience=10.0) as unit:
             await unit.move_by(100)
             await unit.wait(60.0)
             return int(await unit.position())
 
-    with served(model, wanted=[way]) as service:
+    with served(model, endpoints=[way]) as service:
         assert asyncio.run(asyncio.wait_for(drive(written(way, address(service))), 120)) == 100
 
 
@@ -106,12 +109,12 @@ def test_who_watches_is_told_how_far_a_long_operation_is() -> None:
 
 def test_a_lost_unit_is_found_again_by_its_link(tmp_path: object) -> None:
     link = f"{tmp_path}/stepper"
-    with served("gs-c200", wanted=[Wanted("pty", link)]):
+    with served("gs-c200", endpoints=[EndpointSpec("pty", link)]):
         unit = connect("gs-c200", link)
         assert unit.position() == 0
     with pytest.raises(ConnectionError, match="GS-C200: the port is gone"):
         unit.position()
-    with served("gs-c200", wanted=[Wanted("pty", link)]):
+    with served("gs-c200", endpoints=[EndpointSpec("pty", link)]):
         assert unit.position() == 0
         unit.close()
 

@@ -9,7 +9,7 @@ from tests.realtime.ticking import TickingCell
 
 from detent.cell.description import parse
 from detent.realtime.appearing import devices, wait_for
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.loop import Loop
 from detent.realtime.notify import Notifier
 from detent.realtime.pace import Pace
@@ -128,8 +128,8 @@ def test_what_a_cell_needs_before_it_can_be_served() -> None:
     board, host = "/dev/serial/by-id/board", "/dev/serial/by-id/host"
     assert devices(described, (), real=True) == {board: "boards.b.serial", host: "lines.host.endpoint"}
     assert devices(described, (), real=False) == {host: "lines.host.endpoint"}
-    assert devices(described, [Wanted("serial", "/dev/ttyS0")], real=False) == {"/dev/ttyS0": "--serial"}
-    assert devices(described, [Wanted("pty")], real=False) == {}
+    assert devices(described, [EndpointSpec("serial", "/dev/ttyS0")], real=False) == {"/dev/ttyS0": "--serial"}
+    assert devices(described, [EndpointSpec("pty")], real=False) == {}
 
 
 @pytest.mark.parametrize("order", [("a", "b"), ("b", "a")])

@@ -7,7 +7,7 @@ import pytest
 
 from detent.cell.description import Problem, parse, single
 from detent.realtime.endpoints.endpoint import EndpointError
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.images import Images
 from detent.realtime.service import Service, models
 
@@ -62,8 +62,8 @@ def test_a_controller_is_served_at_a_pseudo_terminal() -> None:
 
 
 def test_every_line_of_a_cell_gets_its_own_endpoint(tmp_path: Path) -> None:
-    wanted = [Wanted("pty", str(tmp_path / "x")), Wanted("tcp", "127.0.0.1:0")]
-    with Service(parse(TWO_LINES, "two.toml"), no_file, wanted) as service:
+    endpoints = [EndpointSpec("pty", str(tmp_path / "x")), EndpointSpec("tcp", "127.0.0.1:0")]
+    with Service(parse(TWO_LINES, "two.toml"), no_file, endpoints) as service:
         assert [(e.unit, e.kind) for e in service.endpoints] == [
             ("bar", "pty"),
             ("bar", "tcp"),
@@ -84,7 +84,7 @@ def test_the_cell_file_says_where_a_line_is_found(tmp_path: Path) -> None:
     text = f'{ONE_LINE}endpoint = "pty:{tmp_path / "bus"}"\n'
     with Service(parse(text, "one.toml"), no_file) as service:
         assert service.endpoints[0].address == str(tmp_path / "bus")
-    with Service(parse(text, "one.toml"), no_file, [Wanted("tcp", "127.0.0.1:0")]) as service:
+    with Service(parse(text, "one.toml"), no_file, [EndpointSpec("tcp", "127.0.0.1:0")]) as service:
         assert [e.kind for e in service.endpoints] == ["tcp"], "what is asked for goes before what is written"
 
 
@@ -96,7 +96,7 @@ def test_a_wrong_endpoint_in_the_cell_file_is_named_with_its_key() -> None:
 def test_when_the_last_endpoint_cannot_be_opened_the_others_are_closed(tmp_path: Path) -> None:
     (tmp_path / "x-drill").touch()
     with pytest.raises(EndpointError):
-        Service(parse(TWO_LINES, "two.toml"), no_file, [Wanted("pty", str(tmp_path / "x"))])
+        Service(parse(TWO_LINES, "two.toml"), no_file, [EndpointSpec("pty", str(tmp_path / "x"))])
     assert [path.name for path in tmp_path.iterdir()] == ["x-drill"]
 
 

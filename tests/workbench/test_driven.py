@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from detent.cell.description import Problem
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.workbench.client import Bench, BenchError
 
 PATIENCE = 60  # seconds, when something is broken
@@ -29,7 +29,9 @@ def play(scene: Callable[[Bench], Awaitable[None]], tmp_path: Path, text: str = 
     async def whole() -> None:
         cell = tmp_path / "cell.toml"
         cell.write_text(text)
-        bench = await Bench.open(str(cell), real=True, wanted=[Wanted("tcp", "127.0.0.1:0")], line_timing=False)
+        bench = await Bench.open(
+            str(cell), real=True, endpoints=[EndpointSpec("tcp", "127.0.0.1:0")], line_timing=False
+        )
         try:
             await asyncio.wait_for(scene(bench), PATIENCE)
         finally:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from detent.cell.description import Problem
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.ticks import MS, SECOND
 from detent.workbench.client import Bench, BenchError
 from detent.workbench.engine import BASE, BATCH, LEAST_KEPT, keep
@@ -173,7 +173,7 @@ def test_a_program_at_the_pseudo_terminal_is_answered_while_one_goes_back_in_tim
         finally:
             terminal.close()
 
-    play(scene, "gs-c200", straps=["CHS=low"], wanted=[Wanted("pty")])
+    play(scene, "gs-c200", straps=["CHS=low"], endpoints=[EndpointSpec("pty")])
 
 
 def test_actions_with_pins_straps_supply_and_memory(tmp_path: Path) -> None:
@@ -321,7 +321,7 @@ def test_a_port_that_was_any_is_the_same_one_after_a_crash() -> None:
         await bench.revive()
         assert bench.picture.lines["bar"].endpoints == before
 
-    play(scene, wanted=[Wanted("tcp", "127.0.0.1:0")])
+    play(scene, endpoints=[EndpointSpec("tcp", "127.0.0.1:0")])
 
 
 def test_faults_are_set_by_the_words_of_the_control_api_stand_and_are_mended_and_belong_to_the_past() -> None:

@@ -18,7 +18,7 @@ from detent.hosts.errors import DriverError
 from detent.hosts.genstepper import BlockingGenStepper, GenStepper
 from detent.hosts.gsc200 import BlockingGsC200, GsC200
 from detent.hosts.supersigma import BlockingSupersigma, Supersigma
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.service import Service
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
@@ -145,7 +145,7 @@ def at_desk(folder: Path, scene: Callable[[Desk], Awaitable[None]]) -> None:
 @contextmanager
 def served(model: str, pace: int = 20) -> Iterator[str]:
     text = f'[units.unit]\nmodel = "{model}"\n'
-    with Service(parse(text, "cell"), lambda file: "", [Wanted("pty")], pace=pace) as service:
+    with Service(parse(text, "cell"), lambda file: "", [EndpointSpec("pty")], pace=pace) as service:
         serving = threading.Thread(target=service.run)
         serving.start()
         try:
@@ -172,12 +172,12 @@ def test_hands_in_the_commands_of_the_controller(tmp_path: Path, model: str) -> 
             model, address, "motor=X patience=2" if model == "bs0610" else "patience=2"
         )
         await desk.until(name, lambda facts: facts["position"] == 0)
-        sent = await desk.units.unit_hand(name, "jog", 250)
+        sent = await desk.units.unit_move(name, "jog", 250)
         assert any("250" in line for line in sent), sent
         await desk.until(name, lambda facts: facts["position"] == 250 and not facts["moving"])
-        await desk.units.unit_hand(name, "zero")
+        await desk.units.unit_move(name, "zero")
         await desk.until(name, lambda facts: facts["position"] == 0)
-        await desk.units.unit_hand(name, "go", 70)
+        await desk.units.unit_move(name, "go", 70)
         await desk.until(name, lambda facts: facts["position"] == 70 and not facts["moving"])
         await desk.units.unit_hold(name, 200.0)  # and its window is never heard of again
         facts = await desk.until(name, lambda facts: facts["outcome"])

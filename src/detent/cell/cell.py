@@ -28,7 +28,7 @@ from detent.cell.actions import (
 from detent.cell.breakage import Fault, find_pin
 from detent.cell.delivery import Delivery, Store, Typed, no_store, nobody_asks
 from detent.cell.recording import Log, Received, Recording
-from detent.cell.wiring import Talker, Wiring
+from detent.cell.wiring import SerialUnit, Wiring
 from detent.controllers.device import Controller, Device
 from detent.lines.line import Line
 from detent.pins import Level, Net, PinKind
@@ -238,7 +238,7 @@ class Cell(Delivery):
         if not self._acting:
             self._catch_up()
         self._outside.typed(unit, text)
-        self.send(line, self.talker(unit).frame(text))
+        self.send(line, self.serial_unit(unit).frame(text))
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:
         """Drive an input pin from outside, now: a hand with a wire. Other drivers of its net are not asked.
@@ -249,7 +249,7 @@ class Cell(Delivery):
         if not self._acting:
             self._catch_up()
             self._keep(SetPin(unit, pin, level))
-        self._hands[index, pin] = level
+        self._forced[index, pin] = level
         if not self.faults.holds(index, pin):
             self.give(index, pin, level)
 
@@ -265,7 +265,7 @@ class Cell(Delivery):
         if not self._acting:
             self._catch_up()
             self._keep(Release(unit, pin))
-        self._hands.pop((index, pin), None)
+        self._forced.pop((index, pin), None)
         if not self.faults.holds(index, pin):
             self.give(index, pin, self.given(index, pin))
 
@@ -382,9 +382,9 @@ class Cell(Delivery):
     # -- looking -----------------------------------------------------------------------------------------
 
     @property
-    def hands(self) -> Mapping[tuple[int, str], Level]:
+    def forced(self) -> Mapping[tuple[int, str], Level]:
         """The inputs that are given a level from outside, by unit and pin."""
-        return self._hands
+        return self._forced
 
     def unit(self, name: str) -> int:
         """The index of a unit. Raises KeyError."""
@@ -400,14 +400,14 @@ class Cell(Delivery):
             raise TypeError(f"unit {name!r} is not a controller")
         return part  # type: ignore[return-value]
 
-    def talker(self, name: str) -> Talker:
+    def serial_unit(self, name: str) -> SerialUnit:
         """The controller or adapter of that name. Raises KeyError, TypeError if it has no serial port."""
         part = self.parts[self.unit(name)]
         if not hasattr(part, "frame"):
             raise TypeError(f"unit {name!r} has no serial port")
         return part  # type: ignore[return-value]
 
-    def talkers(self) -> list[str]:
+    def serial_units(self) -> list[str]:
         """The units to which a host outside can speak, in file order."""
         return [name for name, line in zip(self.wiring.names, self.wiring.line_of, strict=False) if line >= 0]
 

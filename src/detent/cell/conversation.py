@@ -114,7 +114,7 @@ class Conversation:
     def answers(self, exchange: Exchange) -> list[str]:
         """What the host reads in what it has heard."""
         assert self._cell is not None
-        return self._cell.talker(exchange.unit).answers(bytes(exchange.heard))
+        return self._cell.serial_unit(exchange.unit).answers(bytes(exchange.heard))
 
     def said(self) -> dict[str, list[str]]:
         """What units said unasked, by unit: of those that hold programs, which may speak; others only sign on."""

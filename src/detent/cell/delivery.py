@@ -69,7 +69,7 @@ class Delivery:
         self.recording = recording
         self._outside = Outside(store, typed)
         self.faults = Faults()
-        self._hands: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
+        self._forced: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
         self._supplied: set[int] = set()  # units that are switched on
         self._strange: dict[int, Format] = {}  # units that speak in another format than their line
         self._driving: set[tuple[int, str]] = set()  # outputs that drive their nets: the others let them float
@@ -296,7 +296,7 @@ class Delivery:
         if net is not None:
             return self.nets[net].level
         found = find_pin(self.parts[part].pins, pin)
-        return self._hands.get((part, pin), HIGH if found is None else found.rest)
+        return self._forced.get((part, pin), HIGH if found is None else found.rest)
 
     def drive(self, net: int, driver: tuple[int, str], level: Level) -> None:
         """Put a level on a net, now."""

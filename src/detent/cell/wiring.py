@@ -17,7 +17,7 @@ class Follower(Protocol):
         """The power stage of the unit is commanded so, or its supply is switched."""
 
 
-class Talker(Protocol):
+class SerialUnit(Protocol):
     """A unit as its host sees it: a controller, or an adapter in front of others."""
 
     def frame(self, text: str) -> bytes:

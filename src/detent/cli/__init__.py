@@ -83,7 +83,7 @@ def main(tokens: Sequence[str] | None = None) -> None:
     from detent.cli import overview, plain
 
     given = list(sys.argv[1:] if tokens is None else tokens)
-    if overview.wanted(given):
+    if overview.is_asked_for(given):
         try:
             overview.show(TITLE, [(name, line) for name, (_, line) in VERBS.items()], COMPLETION)
         except BrokenPipeError:

@@ -98,7 +98,7 @@ def restore(
     unit
         Which unit is meant, and its line.
     """
-    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.endings import asked_wrongly, failed
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
     from detent.hosts.backups import Backup, BackupError
@@ -156,7 +156,7 @@ def _tell(json: bool, file: Path, differences: list[str], told: list[str], befor
 
 def _keeps(model: str) -> None:
     """End the program if a model keeps nothing, or is none."""
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.realtime.connect import host
 
     try:
@@ -182,7 +182,7 @@ def _free(file: Path) -> Path:
 
 
 def _write(file: Path, saved: "Backup") -> None:
-    from detent.cli.target import failed
+    from detent.cli.endings import failed
     from detent.outputs.files import write_whole
     from detent.workbench.units.backups import explained
 

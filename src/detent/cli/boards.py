@@ -163,14 +163,14 @@ def _check(
 ) -> None:  # fmt: skip
     from detent.cell.build import build
     from detent.cell.description import Problem
-    from detent.cli.target import asked_wrongly, failed
-    from detent.cli.target import target as find
+    from detent.cli.endings import asked_wrongly, failed
     from detent.controllers.catalogue import unknown
     from detent.realtime.boards.checking import MOST_RATE, Check, Trouble
     from detent.realtime.boards.drive import Opened, RealPins
+    from detent.realtime.cell_source import find_cell
 
     try:
-        found = find(file)
+        found = find_cell(file)
         if steps is not None and not 1 <= steps <= 1_000_000:
             raise Problem("", "--steps", f"{steps}: 1 to 1000000 pulses")
         if speed is not None and not 1 <= speed <= MOST_RATE:

@@ -39,7 +39,7 @@ def control(
     json
         Print the answer as one line of JSON.
     """
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.realtime import verbs
     from detent.realtime.verbs import AskedWrongly
 
@@ -100,7 +100,7 @@ def _ask(url: str, verb: "Verb", given: Mapping[str, str], token: str | None, pa
     from http.client import HTTPConnection, HTTPException
     from urllib.parse import urlsplit
 
-    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.endings import asked_wrongly, failed
     from detent.realtime.verbs import AskedWrongly
 
     try:

@@ -32,14 +32,15 @@ def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bo
     """
     from detent.cell.build import build
     from detent.cli import outcome
+    from detent.cli.endings import failed
     from detent.cli.examples import place as example
-    from detent.cli.target import failed, target
     from detent.outputs.figures import check
+    from detent.realtime.cell_source import find_cell
     from detent.ticks import SECOND
 
     place = example(name) / "cell.toml"
     check(output / f"{name}.png")
-    found = target(str(place))
+    found = find_cell(str(place))
     cell = build(found.description, found.read)
     until = LONGEST * SECOND
     while (at := cell.next_event()) is not None and (name == TOLD or at <= until):

@@ -18,7 +18,7 @@ def docs(*, no_browser: bool = False, json: bool = False) -> None:
     import json as json_text
     import webbrowser
 
-    from detent.cli.target import failed
+    from detent.cli.endings import failed
 
     project = Path(__file__).parents[3]
     site = project / "docs" / "_build" / "html" / "index.html"

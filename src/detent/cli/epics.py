@@ -17,7 +17,7 @@ from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
 if TYPE_CHECKING:
     from detent.bridges.epics.fields import Settings
     from detent.bridges.epics.ioc import ServedMotor
-    from detent.cli.target import Target
+    from detent.realtime.cell_source import CellSource
 
 _SETTINGS = {
     "resolution": "resolution", "egu": "egu", "low": "low", "high": "high", "velocity": "velocity", "base": "base",
@@ -28,7 +28,7 @@ _SETTINGS = {
 Each = Annotated[Sequence[str], Parameter(negative=())]
 
 
-class Wanted(NamedTuple):
+class RecordSetup(NamedTuple):
     """An axis to be served: what it is called, the driver's model and options, where, how its record begins."""
 
     record: str
@@ -111,7 +111,7 @@ def epics(
         Real: which unit is meant, and its line.
     """
     from detent.cell.description import Problem
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.extras import MissingExtra, need
 
     given = {"resolution": resolution, "egu": egu, "low": low, "high": high, "velocity": velocity, "base": base,
@@ -147,15 +147,15 @@ def _axes(
     line_timing: bool,
     strap: Sequence[str],
     options: Sequence[str],
-) -> Iterator[list[Wanted]]:
+) -> Iterator[list[RecordSetup]]:
     """The axes that are asked for. Emulated ones live while this lasts. Raises Problem, ValueError."""
     from detent.cell.description import Problem
-    from detent.cli.target import target as find
     from detent.hosts.genstepper.dialogue import MOTORS
+    from detent.realtime.cell_source import find_cell
     from detent.realtime.connect import host
 
     if port is None:
-        found = find(target, straps=strap, options=options)
+        found = find_cell(target, straps=strap, options=options)
         with _emulated(found, pace, line_timing) as parts:
             yield _named(parts, given)
         return
@@ -172,15 +172,15 @@ def _axes(
 
 @contextmanager
 def _emulated(
-    found: "Target", pace: float, line_timing: bool
+    found: "CellSource", pace: float, line_timing: bool
 ) -> Iterator[Sequence[tuple[str, str, Mapping[str, object], str]]]:
     """Serve the cell in a thread of this process: its axes, each with the port of its line."""
     from detent.bridges.epics.cells import axes
-    from detent.realtime.endpoints.wanted import Wanted as WantedEndpoint
+    from detent.realtime.endpoints.spec import EndpointSpec
     from detent.realtime.service import Service
 
-    wanted = [WantedEndpoint("tcp", "127.0.0.1:0")]
-    with Service(found.description, found.read, wanted, pace=pace, line_timing=line_timing) as service:
+    endpoints = [EndpointSpec("tcp", "127.0.0.1:0")]
+    with Service(found.description, found.read, endpoints, pace=pace, line_timing=line_timing) as service:
         where = {line: address for line, _, address in service.addresses()}
         parts = [
             (axis.title, axis.model, {**axis.options, **axis.form._asdict()}, where[axis.line])
@@ -197,7 +197,7 @@ def _emulated(
 
 def _named(
     parts: Sequence[tuple[str, str, Mapping[str, object], str]], given: Mapping[str, Sequence[str]]
-) -> list[Wanted]:
+) -> list[RecordSetup]:
     """The axes with the names and settings of their records. Raises Problem."""
     from detent.bridges.epics.fields import Settings
     from detent.cell.description import Problem
@@ -226,18 +226,18 @@ def _named(
         if "resolution" in settings:
             settings.setdefault("egu", "")
         try:
-            made.append(Wanted(name, title, model, options, port, Settings(**settings)))  # type: ignore[arg-type]
+            made.append(RecordSetup(name, title, model, options, port, Settings(**settings)))  # type: ignore[arg-type]
         except ValueError as error:
             raise Problem("", name, str(error)) from None
     return made
 
 
 async def _serve(
-    prefix: str, axes: Sequence[Wanted], interfaces: Sequence[str], ready: Callable[[int], None], *, quiet: bool
+    prefix: str, axes: Sequence[RecordSetup], interfaces: Sequence[str], ready: Callable[[int], None], *, quiet: bool
 ) -> None:
     """Serve until a signal comes. Ends the program with 1 where a unit does not answer."""
     from detent.bridges.epics.ioc import serve
-    from detent.cli.target import failed
+    from detent.cli.endings import failed
     from detent.hosts.errors import DriverError
     from detent.realtime.addresses import PortError
 
@@ -262,7 +262,7 @@ async def _serve(
 
 @asynccontextmanager
 async def _motors(
-    prefix: str, axes: Sequence[Wanted], report: Callable[[str], None]
+    prefix: str, axes: Sequence[RecordSetup], report: Callable[[str], None]
 ) -> "AsyncIterator[list[ServedMotor]]":
     """The records, connected to their units. Raises DriverError, PortError, Problem."""
     from detent.bridges.epics.ioc import ServedMotor
@@ -288,7 +288,7 @@ async def _motors(
             await port.close()
 
 
-def _print_names(prefix: str, axes: Sequence[Wanted], *, json: bool) -> None:
+def _print_names(prefix: str, axes: Sequence[RecordSetup], *, json: bool) -> None:
     """The names of all fields that mean something."""
     from detent.bridges.epics.fields import Settings
 
@@ -309,7 +309,7 @@ def _somewhere(settings: "Settings") -> str:
     return repr(high)
 
 
-def _ready(prefix: str, axes: Sequence[Wanted], *, json: bool, everywhere: bool) -> Callable[[int], None]:
+def _ready(prefix: str, axes: Sequence[RecordSetup], *, json: bool, everywhere: bool) -> Callable[[int], None]:
     """What tells people, or a program, that clients can connect."""
     names = [f"{prefix}{axis.record}" for axis in axes]
 

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 if TYPE_CHECKING:
     from detent.cell.cell import Cell
     from detent.outputs.signals import Signals, Watch
-    from detent.realtime.target import Target
+    from detent.realtime.cell_source import CellSource
     from detent.ticks import Ns
 
 LARGE = 20_000_000  # bytes; larger is told before it is begun
 
 
-class Wanted(NamedTuple):
-    """The files to write, None for one that is not wanted.
+class ExportFiles(NamedTuple):
+    """The files to write, None for one that is not asked for.
 
     `sr_rate` are the samples a second of a sigrok session, `frequency` and `error` those of the clock of step files.
     """
@@ -34,7 +34,7 @@ class Wanted(NamedTuple):
 
     @property
     def paths(self) -> list[Path]:
-        """Those that are wanted."""
+        """Those that are asked for."""
         return [path for path in (self.plot, self.vcd, self.sr, self.npz, self.steps) if path is not None]
 
     def check(self, inputs: Sequence[Path], *, force: bool) -> None:
@@ -59,44 +59,44 @@ class Wanted(NamedTuple):
                 check_place(path, inputs)
 
 
-def write(cell: "Cell", target: "Target", wanted: Wanted) -> None:
-    """Write the files that are wanted. Raises ValueError for a wrong choice, OSError, MotorError."""
-    if not wanted.paths:
+def write(cell: "Cell", source: "CellSource", files: ExportFiles) -> None:
+    """Write the files that are asked for. Raises ValueError for a wrong choice, OSError, MotorError."""
+    if not files.paths:
         return
     from detent.outputs import signals
 
-    described = target.description
+    described = source.description
     seen = signals.of_cell(cell, {name: unit.shaft for name, unit in described.units.items()})
-    if wanted.vcd is not None:
+    if files.vcd is not None:
         from detent.outputs import vcd
 
-        with _told(wanted.vcd, vcd.size(seen), seen) as watch:
-            vcd.write(wanted.vcd, seen, watch)
-    if wanted.sr is not None:
+        with _told(files.vcd, vcd.size(seen), seen) as watch:
+            vcd.write(files.vcd, seen, watch)
+    if files.sr is not None:
         from detent.outputs import sigrok
 
-        rate = wanted.sr_rate or sigrok.SAMPLERATE
-        with _told(wanted.sr, sigrok.size(seen, rate), seen, compressed=True) as watch:
-            sigrok.write(wanted.sr, seen, samplerate=rate, watch=watch)
-    if wanted.npz is not None:
+        rate = files.sr_rate or sigrok.SAMPLERATE
+        with _told(files.sr, sigrok.size(seen, rate), seen, compressed=True) as watch:
+            sigrok.write(files.sr, seen, samplerate=rate, watch=watch)
+    if files.npz is not None:
         from detent.outputs import arrays
 
-        with _told(wanted.npz, arrays.size(seen), seen, compressed=True) as watch:
-            arrays.write(wanted.npz, seen, watch=watch)
-    if wanted.steps is not None:
+        with _told(files.npz, arrays.size(seen), seen, compressed=True) as watch:
+            arrays.write(files.npz, seen, watch=watch)
+    if files.steps is not None:
         from detent.outputs import step_file
         from detent.ticks import parse_duration
 
-        error: Literal["exact"] | Ns = "exact" if wanted.error == "exact" else parse_duration(wanted.error)
+        error: Literal["exact"] | Ns = "exact" if files.error == "exact" else parse_duration(files.error)
         try:
-            step_file.write(wanted.steps, seen, wanted.frequency, error)
+            step_file.write(files.steps, seen, files.frequency, error)
         except ValueError as problem:
-            raise ValueError(f"--steps-frequency {wanted.frequency}: {problem}; take a faster clock") from None
-    if wanted.plot is not None:
+            raise ValueError(f"--steps-frequency {files.frequency}: {problem}; take a faster clock") from None
+    if files.plot is not None:
         from detent.outputs import figures, rotors
 
-        title = described.title or target.name
-        figures.write(wanted.plot, seen, title=title, rotors=rotors.of_cell(cell))
+        title = described.title or source.name
+        figures.write(files.plot, seen, title=title, rotors=rotors.of_cell(cell))
 
 
 @contextmanager

@@ -40,7 +40,7 @@ def find(
     json
         Print what was found as one line of JSON.
     """
-    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.endings import asked_wrongly, failed
     from detent.hosts.finding import USUAL
     from detent.realtime.addresses import Address
     from detent.realtime.finding import listed, passes_for

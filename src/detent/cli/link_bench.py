@@ -49,7 +49,7 @@ def bench(
     """
     from time import perf_counter
 
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
     from detent.hosts.exchange import Progress

@@ -21,7 +21,7 @@ def models(model: str | None = None, *, json: bool = False, markdown: bool = Fal
     markdown
         Print the tables in Markdown, as the reference pages have them.
     """
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.controllers import catalogue
 
     if model is None:

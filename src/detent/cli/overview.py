@@ -11,7 +11,7 @@ _OTHERWISE = ("FORCE_COLOR", "NO_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE", "J
 _NARROWEST = 72  # columns; below that cyclopts squeezes what it prints in ways of its own
 
 
-def wanted(tokens: Sequence[str]) -> bool:
+def is_asked_for(tokens: Sequence[str]) -> bool:
     """Whether it is asked for, at a terminal for which it is known how cyclopts writes."""
     if list(tokens) not in (["--help"], ["-h"], []):
         return False

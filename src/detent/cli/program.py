@@ -108,7 +108,7 @@ def download(
     unit
         Which unit is meant, and its line.
     """
-    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.endings import asked_wrongly, failed
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
     from detent.outputs.files import write_whole
@@ -165,12 +165,12 @@ def compare(
     """
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
-    from detent.workbench.units.programs import places_of, wanted_of
+    from detent.workbench.units.programs import numbered_lines_of, places_of
 
     assembly = _assembled(model, file)
     with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
         there = found.perform(places_of(found.driver, assembly))
-    wanted = wanted_of(assembly)
+    wanted = numbered_lines_of(assembly)
     differences = list(unified_diff(there, wanted, "the unit", str(file), lineterm="", n=2))
     if json:
         print(json_text.dumps({"model": model, "port": port, "file": str(file), "differences": differences}))
@@ -183,7 +183,7 @@ def compare(
 
 
 def _language(model: str) -> Language[Any]:
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.controllers.catalogue import CatalogueError, language
 
     try:
@@ -194,7 +194,7 @@ def _language(model: str) -> Language[Any]:
 
 def _assembled(model: str, file: Path) -> Assembly[Any]:
     """The assembled source; every error of it is reported before the program ends."""
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.realtime.texts import read_text
 
     language = _language(model)

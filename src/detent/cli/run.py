@@ -89,20 +89,20 @@ def run(
     from detent.cell.delivery import Oscillation
     from detent.cell.description import Problem
     from detent.cli import FAILED, exports, outcome
-    from detent.cli.target import asked_wrongly, failed
-    from detent.cli.target import target as find
+    from detent.cli.endings import asked_wrongly, failed
     from detent.motors.motor import MotorError
+    from detent.realtime.cell_source import find_cell
     from detent.ticks import parse_duration, show_duration
 
-    wanted = exports.Wanted(plot, vcd, sr, npz, steps, sr_rate, steps_frequency, steps_error)
+    files = exports.ExportFiles(plot, vcd, sr, npz, steps, sr_rate, steps_frequency, steps_error)
     conversation = Conversation()
     try:
-        found = find(target, straps=strap, options=set_, programs=program, pins=pin)
+        found = find_cell(target, straps=strap, options=set_, programs=program, pins=pin)
         until = None if for_ is None else parse_duration(for_)
-        wanted.check(found.inputs, force=force)
-        cell = build(found.description, found.read, record=bool(wanted.paths), line_timing=line_timing,
+        files.check(found.inputs, force=force)
+        cell = build(found.description, found.read, record=bool(files.paths), line_timing=line_timing,
                      typed=conversation.typed)  # fmt: skip
-        witness = conversation.attend(cell, keeps=bool(wanted.paths))
+        witness = conversation.attend(cell, keeps=bool(files.paths))
         lines = [_addressed(cell, text) for text in send]
         if until is not None and until > cell.latest:
             raise Problem("", "--for", f"with a motor a cell runs for {show_duration(cell.latest)} at most")
@@ -116,7 +116,7 @@ def run(
         failed(error)
     told = outcome.Outcome(cell, ended, conversation, course.sent, course.unsent, list(witness.moving), motors)
     try:
-        exports.write(cell, found, wanted)
+        exports.write(cell, found, files)
     except MotorError as error:
         failed(error)
     except ValueError as error:
@@ -126,7 +126,7 @@ def run(
     if json:
         print(json_text.dumps(outcome.facts(told)))
     else:
-        outcome.show(told, wanted.paths)
+        outcome.show(told, files.paths)
     outcome.warn(told)
     if told.refused or told.unsent or (not allow_loss and any(motor.lost for motor in motors)):
         raise SystemExit(FAILED)
@@ -159,7 +159,7 @@ def _addressed(cell: "Cell", text: str) -> Step:
             return Pause(None if text[1:].strip() == "idle" else parse_duration(text[1:]))
         except ValueError as error:
             raise Problem("", "--send", f"{error}; or '@ idle'") from None
-    units = cell.talkers() or list(cell.controllers())
+    units = cell.serial_units() or list(cell.controllers())
     unit, colon, line = (units[0], ":", text) if len(units) == 1 else text.partition(":")
     if not colon:
         raise Problem("", "--send", f"{text!r}: a cell has several units, write UNIT:LINE")
@@ -168,7 +168,7 @@ def _addressed(cell: "Cell", text: str) -> Step:
     if cell.wiring.line_of[cell.unit(unit)] < 0:
         raise Problem("", "--send", f"{unit} is on no line")
     try:
-        cell.talker(unit).frame(line)
+        cell.serial_unit(unit).frame(line)
     except ValueError as error:
         raise Problem("", "--send", str(error)) from None
     return Line(unit, line)
@@ -231,7 +231,7 @@ class _Course:
         from detent.ticks import NEVER
 
         cell, conversation = self._cell, self._conversation
-        wire, controller = cell.lines[cell.wiring.line_of[cell.unit(line.unit)]], cell.talker(line.unit)
+        wire, controller = cell.lines[cell.wiring.line_of[cell.unit(line.unit)]], cell.serial_unit(line.unit)
         one = cell.controllers().get(line.unit)  # none: an adapter
         while one is not None and one.status(cell.now).state == "starting" and self._step():
             pass  # a board that is deaf after its reset

@@ -48,7 +48,7 @@ def send(
     unit
         Which unit is meant, and its line.
     """
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.cli.unit import unit as connected
     from detent.hosts.typed import MOTION, leave, say
     from detent.hosts.typed import raw as exchange

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from detent.cell.cell import Cell
     from detent.cell.description import Description
     from detent.realtime.boards.drive import RealPins
+    from detent.realtime.endpoints.spec import EndpointSpec
     from detent.realtime.endpoints.tcp import TcpAddress
-    from detent.realtime.endpoints.wanted import Wanted
     from detent.realtime.notify import Notifier
     from detent.realtime.service import Served, Service
 
@@ -85,9 +85,9 @@ def serve(
     """
     from detent.cell.description import Problem
     from detent.cli import FAILED
-    from detent.cli.target import asked_wrongly, failed
-    from detent.cli.target import target as find
+    from detent.cli.endings import asked_wrongly, failed
     from detent.realtime.boards.drive import take_priority
+    from detent.realtime.cell_source import find_cell
     from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost
     from detent.realtime.images import Images, ImagesUnusable, default_folder
     from detent.realtime.notify import Notifier
@@ -101,11 +101,11 @@ def serve(
             raise Problem("", "", "say what to serve: a model like gs-c200 (detent models), or a CELL.toml")
         if not (math.isfinite(pace) and pace > 0):
             raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
-        wanted = asked_endpoints(links, tcp, rfc2217, serial)
+        endpoints = asked_endpoints(links, tcp, rfc2217, serial)
         control_at = None if control is None else _address("--control", control)
         if real and pace != 1:
             raise Problem("", "--pace", "real pins keep real time: leave it out with --real")
-        found = find(target, straps=strap, options=set_, pins=pin)
+        found = find_cell(target, straps=strap, options=set_, pins=pin)
         folder = state if state is not None else default_folder()
         images = Images.of(folder, target, models(found.description), is_file=bool(found.description.file))
     except (Problem, ImagesUnusable) as error:
@@ -114,9 +114,9 @@ def serve(
     try:
         try:
             if wait:
-                _wait(found.description, wanted, real, notifier)
+                _wait(found.description, endpoints, real, notifier)
             pins = _real_pins(notifier) if real else None
-            service = Service(found.description, found.read, wanted, pace=pace, line_timing=line_timing,
+            service = Service(found.description, found.read, endpoints, pace=pace, line_timing=line_timing,
                               images=images, observed=control_at is not None, on_stop=_tell_stop,
                               real=pins, timers=(notifier,))  # fmt: skip
             url = _control(service, control_at, token)
@@ -159,20 +159,20 @@ def _tell_stop(why: str) -> None:
 
 def asked_endpoints(
     links: list[Path] | None, tcp: str | None, rfc2217: str | None, serial: Path | None
-) -> "list[Wanted]":
+) -> "list[EndpointSpec]":
     """The endpoints that the command line asks for. Raises Problem."""
-    from detent.realtime.endpoints.wanted import Wanted
+    from detent.realtime.endpoints.spec import EndpointSpec
 
-    wanted = []
+    endpoints = []
     if links is not None:
-        wanted.append(Wanted("pty", str(links[0]) if links else ""))
+        endpoints.append(EndpointSpec("pty", str(links[0]) if links else ""))
     for kind, address in (("tcp", tcp), ("rfc2217", rfc2217)):
         if address is not None:
             _address(f"--{kind}", address)
-            wanted.append(Wanted(kind, address))
+            endpoints.append(EndpointSpec(kind, address))
     if serial is not None:
-        wanted.append(Wanted("serial", str(serial)))
-    return wanted
+        endpoints.append(EndpointSpec("serial", str(serial)))
+    return endpoints
 
 
 def _address(flag: str, text: str) -> "TcpAddress":
@@ -202,11 +202,11 @@ def _control(service: "Service", address: "TcpAddress | None", token: str | None
     return http.url
 
 
-def _wait(description: "Description", wanted: "Sequence[Wanted]", real: bool, notifier: "Notifier") -> None:
+def _wait(description: "Description", endpoints: "Sequence[EndpointSpec]", real: bool, notifier: "Notifier") -> None:
     """Until every device is there; told once which are not."""
     from detent.realtime.appearing import devices, wait_for
 
-    needed = devices(description, wanted, real=real)
+    needed = devices(description, endpoints, real=real)
 
     def tell(missing: Sequence[str]) -> None:
         text = "waiting for " + ", ".join(f"{device} ({needed[device]})" for device in missing)

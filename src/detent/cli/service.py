@@ -55,13 +55,13 @@ def service(
     from detent.cell.description import Problem
     from detent.cli.endings import asked_wrongly, failed
     from detent.cli.serve import _address
-    from detent.cli.target import target as find
     from detent.outputs.files import write_whole
+    from detent.realtime.cell_source import find_cell
 
     try:
         if not cell.endswith(".toml"):
             raise Problem("", "", f"{cell} is no cell file: a service needs a CELL.toml with its lines and boards")
-        found = find(cell)
+        found = find_cell(cell)
         if control is not None:
             _address("--control", control)
         called = name if name is not None else _name(Path(cell))

@@ -52,7 +52,7 @@ def size(page: str | None = None, values: Sequence[str] = (), /, *, json: bool =
     json
         Print the result as JSON.
     """
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.controllers.catalogue import unknown
 
     if page is None:

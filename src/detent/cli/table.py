@@ -66,7 +66,7 @@ def table(
     json
         Print everything as JSON.
     """
-    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.endings import asked_wrongly, failed
     from detent.outputs.files import check_inputs, write_whole
     from detent.ramps.differences import EPROM, CurveError, compiled
     from detent.ramps.hex_records import intel_hex

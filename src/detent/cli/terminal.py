@@ -52,7 +52,7 @@ def terminal(
     unit
         Which unit is meant, and its line.
     """
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.cli.unit import unit as connected
     from detent.controllers import catalogue
     from detent.workbench.words import words
@@ -211,7 +211,7 @@ def _emulated(model: str, options: UnitOptions) -> Iterator[str]:
     import threading
 
     from detent.cell.description import single
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.realtime.service import Service
     from detent.ticks import SECOND
 

@@ -105,7 +105,7 @@ def flag(option: str, value: object = None) -> str:
 @contextmanager
 def unit(model: str, port: str, options: UnitOptions, watch: "Watch | None" = None) -> "Iterator[Blocking]":
     """The driver of the unit. What goes wrong ends the program: 2 for what was asked wrongly, 1 for what failed."""
-    from detent.cli.target import asked_wrongly, failed
+    from detent.cli.endings import asked_wrongly, failed
     from detent.hosts.errors import DriverError
     from detent.realtime.addresses import PortError
     from detent.realtime.connect import connect

@@ -31,7 +31,7 @@ def wiring(readings: Sequence[str] = (), /, *, motor: str | None = None, json: b
     json
         Print the result as JSON.
     """
-    from detent.cli.target import asked_wrongly
+    from detent.cli.endings import asked_wrongly
     from detent.controllers.catalogue import unknown
     from detent.controllers.genstepper import motors
     from detent.controllers.genstepper.wiring import WiringError, find

@@ -98,10 +98,10 @@ def workbench(
         Which real unit is meant, and its line.
     """
     from detent.cell.description import Problem
+    from detent.cli.endings import asked_wrongly, failed
     from detent.cli.serve import asked_endpoints
-    from detent.cli.target import asked_wrongly, failed
-    from detent.cli.target import target as find
     from detent.extras import MissingExtra, need
+    from detent.realtime.cell_source import find_cell
     from detent.realtime.examples import home
     from detent.realtime.images import ImagesUnusable, cell_name, default_folder
 
@@ -120,7 +120,7 @@ def workbench(
         if memory < 256:
             raise Problem("", "--memory", f"{memory} MB are too few; it takes at least 256")
         endpoints = asked_endpoints(links, tcp, rfc2217, serial)
-        find(shown, straps=strap, options=set_)  # at once, not when everything is loaded
+        find_cell(shown, straps=strap, options=set_)  # at once, not when everything is loaded
         written = _unit_options(target, at, unit)
     except (Problem, MissingExtra) as error:
         asked_wrongly(error)
@@ -156,7 +156,7 @@ def workbench(
     async def show() -> None:
         opening = asyncio.create_task(
             Bench.open(
-                shown, straps=strap, options=set_, wanted=endpoints, pace=pace, line_timing=line_timing,
+                shown, straps=strap, options=set_, endpoints=endpoints, pace=pace, line_timing=line_timing,
                 state_dir=kept, held=hold, real=real, memory=memory,
             )
         )  # fmt: skip
@@ -211,7 +211,7 @@ def _unit_options(target: str | None, at: str | None, unit: UnitOptions) -> str:
 
 
 def _is_file(target: str) -> bool:
-    """Whether a target is a cell file, as `cli.target` tells it from a model."""
+    """Whether a target is a cell file, as `realtime.cell_source` tells it from a model."""
     return target.endswith(".toml") or "/" in target
 
 

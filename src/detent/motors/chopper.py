@@ -29,14 +29,14 @@ class Waveform(NamedTuple):
     times: Floats  # s
     ia: Floats
     ib: Floats
-    wanted_a: Floats
-    wanted_b: Floats
+    reference_a: Floats
+    reference_b: Floats
     torque: float  # Nm, the mean of it
 
     @property
     def ripple(self) -> float:
         """A, rms, of the currents against what was wanted."""
-        both = np.concatenate((self.ia - self.wanted_a, self.ib - self.wanted_b))
+        both = np.concatenate((self.ia - self.reference_a, self.ib - self.reference_b))
         return float(np.sqrt((both**2).mean()))
 
 

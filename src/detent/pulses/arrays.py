@@ -51,7 +51,7 @@ def use(path: Path) -> None:
     _path = path
 
 
-def dense_wanted(pulses: int) -> bool:
+def goes_to_numba(pulses: int) -> bool:
     """Whether a run of so many pulses goes to the numba loop."""
     if _path == "auto":
         return pulses >= DENSE_FROM and installed("fast")
@@ -86,7 +86,7 @@ def fill_ramp(out: Int64Array, first: int, law: "Accelerating", start: Fixed) ->
     """Write the ns of the pulses first .. of a ramp in a train that starts at `start`."""
     scale = (law.divisor * ONE_NS) ** 2  # (P x + Q**2) / scale is the square of the ns from standstill
     gain = law.gain_ns
-    dense = _dense() if dense_wanted(len(out)) else None
+    dense = _dense() if goes_to_numba(len(out)) else None
     done, size = 0, CHUNK if dense is None else DENSE_CHUNK
     while done < len(out):
         count = min(size, len(out) - done)

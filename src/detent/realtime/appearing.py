@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 from detent.cell.description import Description
 from detent.realtime.boards.ports import FAKE
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 
 LOOK_EVERY = 0.5  # s
 
 
-def devices(described: Description, wanted: Sequence[Wanted], *, real: bool) -> dict[str, str]:
+def devices(described: Description, endpoints: Sequence[EndpointSpec], *, real: bool) -> dict[str, str]:
     """The devices that have to be there before a cell can be served, each with the key or flag that names it."""
     found: dict[str, str] = {}
     if real:
@@ -21,10 +21,10 @@ def devices(described: Description, wanted: Sequence[Wanted], *, real: bool) -> 
             device = device if at and baud.isdigit() else board.serial
             if name in used and not device.startswith(FAKE):
                 found.setdefault(device, f"boards.{name}.serial")
-    for one in wanted:
+    for one in endpoints:
         if one.kind == "serial":
             found.setdefault(one.where, "--serial")
-    for name, line in described.lines.items() if not wanted else ():
+    for name, line in described.lines.items() if not endpoints else ():
         kind, _, device = (line.endpoint or "").partition(":")
         if kind == "serial" and device:
             found.setdefault(device, f"lines.{name}.endpoint")

@@ -21,7 +21,7 @@ from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.guarded import Guarded
 from detent.realtime.images import Images
 from detent.realtime.loop import BEHIND, Loop, Timer, stopped_by_signals, wake_exactly
@@ -49,7 +49,7 @@ class Service:
         self,
         description: Description,
         read: Callable[[str], str],
-        wanted: Sequence[Wanted] = (),
+        endpoints: Sequence[EndpointSpec] = (),
         *,
         pace: Fraction | float = 1,
         line_timing: bool = True,
@@ -59,7 +59,7 @@ class Service:
         real: RealPins | None = None,
         timers: Sequence[Timer] = (),
     ) -> None:
-        """Build the cell and open what is `wanted` for every line; nothing: what the cell file says, or a pty.
+        """Build the cell and open `endpoints` for every line; nothing: what the cell file says, or a pty.
 
         `images` stay their owner's. One that is `observed` can be looked at and meddled with (`realtime.control`).
         `on_stop` is told when the cell cannot go on; it is served all the same. With `real` it drives the boards of its
@@ -68,8 +68,8 @@ class Service:
         self.description = description
         self.driven: Driven | None = None
         self.reports: list[str] = []  # about images that could not be used, and what a real cell would not stand
-        ends = [line.endpoint for line in description.lines.values() if line.endpoint and not wanted]
-        if any(w.kind == "serial" for w in wanted) or (ends and all(end.startswith("serial:") for end in ends)):
+        ends = [line.endpoint for line in description.lines.values() if line.endpoint and not endpoints]
+        if any(w.kind == "serial" for w in endpoints) or (ends and all(end.startswith("serial:") for end in ends)):
             line_timing = False  # the wire outside takes the time
         if real is not None and pace != 1:
             raise Problem("", "pace", "real pins keep real time: leave the pace at 1")
@@ -93,7 +93,7 @@ class Service:
                 self.driven = opened.drive(self.cell, stores)
                 opening.callback(self.driven.close)
             self._to_begin = opened
-            self._opened = open_endpoints(description, self.cell, wanted, opening)
+            self._opened = open_endpoints(description, self.cell, endpoints, opening)
             self.endpoints = [
                 Served(self._title(number), endpoint.kind, endpoint.address, self.cell.lines[number].format)
                 for number, endpoint in self._opened
@@ -217,13 +217,13 @@ def _watch(cell: Cell, *, passes_on: bool) -> Watch:
 def open_endpoints(
     description: Description,
     cell: Cell,
-    wanted: Sequence[Wanted],
+    endpoints: Sequence[EndpointSpec],
     opening: contextlib.ExitStack,
     *,
-    placed: Mapping[str, Sequence[Wanted]] | None = None,
+    placed: Mapping[str, Sequence[EndpointSpec]] | None = None,
     link: Callable[[str], Path] | None = None,
 ) -> list[tuple[int, Endpoint]]:
-    """Open what is `wanted` for every line, with the line's number; nothing: what the cell file says, or a pty.
+    """Open `endpoints` for every line, with the line's number; nothing: what the cell file says, or a pty.
 
     `placed` says it for lines by name instead: those of a service before this one. A pty that nobody has given a place
     gets the `link` for its line, if that can be had. `opening` closes them. Raises Problem, EndpointError, ValueError.
@@ -236,16 +236,16 @@ def open_endpoints(
     for place, number in enumerate(outside):
         name = names[number]
         found = placed.get(name) if placed else None
-        for one in found or _for_line(description, wanted, place, name, len(outside)):
+        for one in found or _for_line(description, endpoints, place, name, len(outside)):
             line = cell.lines[number]
             units = [description.units[cell.wiring.names[unit]].model for unit, _ in cell.wiring.lines[number]]
             echoes = any(model.echoes for name, model in catalogue.MODELS.items() if name in units)
             endpoint = None
-            if one == Wanted("pty") and link is not None:
+            if one == EndpointSpec("pty") and link is not None:
                 with contextlib.suppress(EndpointError, OSError):  # another has it: then without
                     there = link(name)
                     there.parent.mkdir(parents=True, exist_ok=True)
-                    endpoint = Wanted("pty", str(there)).open(name, line.format, line.parting, echoes=echoes)
+                    endpoint = EndpointSpec("pty", str(there)).open(name, line.format, line.parting, echoes=echoes)
             if endpoint is None:
                 endpoint = one.open(name, line.format, line.parting, echoes=echoes)
             opening.callback(endpoint.close)
@@ -254,16 +254,16 @@ def open_endpoints(
 
 
 def _for_line(
-    description: Description, wanted: Sequence[Wanted], number: int, name: str, lines: int
-) -> Sequence[Wanted]:
+    description: Description, endpoints: Sequence[EndpointSpec], number: int, name: str, lines: int
+) -> Sequence[EndpointSpec]:
     """The endpoints of one line."""
-    if wanted:
-        return wanted if lines == 1 else [one.of_several(number, name) for one in wanted]
+    if endpoints:
+        return endpoints if lines == 1 else [one.of_several(number, name) for one in endpoints]
     described = description.lines.get(name)
     if described is None or described.endpoint is None:
-        return (Wanted("pty"),)
+        return (EndpointSpec("pty"),)
     try:
-        return (Wanted.parse(described.endpoint),)
+        return (EndpointSpec.parse(described.endpoint),)
     except ValueError as error:
         raise Problem(description.file, f"lines.{name}.endpoint", str(error)) from None
 

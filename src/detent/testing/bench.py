@@ -5,7 +5,7 @@ same, as a cell's time is computed and not slept for. The test itself never slee
 """
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +13,7 @@ from detent.cell.description import Description, Problem, parse, single
 from detent.controllers import catalogue
 from detent.realtime import verbs
 from detent.realtime.control import PATIENCE, Control
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.images import Images, cell_name
 from detent.realtime.service import Service, models
 from detent.realtime.texts import read_text
@@ -227,13 +227,16 @@ class Bench:
         same = sum(other == name and serving.alive for other, serving in self._open)
         folder = self.folder / (f"eeprom-{same + 1}" if same else "eeprom")  # two at once have their own
         images = Images.of(folder, str(target), models(description), is_file=bool(description.file))
-        wanted: Sequence[Wanted] = [Wanted("pty"), *([Wanted("tcp", "127.0.0.1:0")] if tcp else [])]
+        endpoints = [
+            EndpointSpec("pty"),
+            *([EndpointSpec("tcp", "127.0.0.1:0")] if tcp else []),
+        ]
         beside = Path(description.file).parent if description.file else Path()
         try:
             service = Service(
                 description,
                 lambda file: read_text(beside / file),
-                wanted,
+                endpoints,
                 pace=1 if pace is None else pace,
                 line_timing=line_timing,
                 images=images,

@@ -18,8 +18,8 @@ from detent.cell.description import Problem
 from detent.cell.history import Cut
 from detent.outputs.signals import Signals
 from detent.pins import Level
-from detent.realtime.endpoints.wanted import Wanted
-from detent.realtime.target import target as find
+from detent.realtime.cell_source import find_cell
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.ticks import SECOND, Ns
 from detent.workbench import exports
 from detent.workbench.messages import (
@@ -78,7 +78,7 @@ class Bench:
         *,
         straps: Sequence[str] = (),
         options: Sequence[str] = (),
-        wanted: Sequence[Wanted] = (),
+        endpoints: Sequence[EndpointSpec] = (),
         pace: float | None = 1.0,
         line_timing: bool = True,
         state_dir: Path | None = None,
@@ -88,12 +88,12 @@ class Bench:
     ) -> "Bench":
         """Start the engine for `target`, a model or a cell file, and wait until it serves.
 
-        `straps` and `options` are written as for `serve` (PIN=LEVEL or UNIT.PIN=LEVEL). `wanted`: endpoints, of every
+        `straps` and `options` are written as for `serve` (PIN=LEVEL or UNIT.PIN=LEVEL). `endpoints`: of every
         line; none: what the cell file says, or a pty. `state_dir` keeps EEPROM images. `real` drives the pins of its
         boards. The past that is kept takes about `memory` MB; what is older is dropped. Raises Problem if it was asked
         wrongly, BenchError if it failed.
         """
-        order = Order(target, tuple(straps), tuple(options), tuple(wanted), pace, line_timing, state_dir, held)
+        order = Order(target, tuple(straps), tuple(options), tuple(endpoints), pace, line_timing, state_dir, held)
         bench = cls(order._replace(memory=memory, real=real))
         try:
             await bench._start(bench._order)
@@ -452,9 +452,9 @@ class Bench:
         actions, until = (tuple(mirror.actions), end) if mirror.complete else (tuple(mirror.loaded.values()), 0)
         self._asked.clear()
         placed = {name: tuple(map(_again, line.endpoints)) for name, line in self.picture.lines.items()}
-        for wanted in (one for several in placed.values() for one in several):
-            if wanted.kind == "pty" and wanted.where and Path(wanted.where).is_symlink():
-                Path(wanted.where).unlink()  # of the one that is gone; its terminal may be another's by now
+        for spec in (one for several in placed.values() for one in several):
+            if spec.kind == "pty" and spec.where and Path(spec.where).is_symlink():
+                Path(spec.where).unlink()  # of the one that is gone; its terminal may be another's by now
         await self._start(self._order._replace(actions=actions, until=until, held=True, placed=placed))
         self.crashed = None
         self._call_back()
@@ -464,20 +464,20 @@ class Bench:
 
         If that fails the old one is begun anew. Raises Problem, BenchError.
         """
-        find(target)  # what is wrong with it is said while the old one goes on
+        find_cell(target)  # what is wrong with it is said while the old one goes on
         before = self._order
-        wanted = before._replace(target=target, straps=(), options=(), actions=(), until=0)
+        order = before._replace(target=target, straps=(), options=(), actions=(), until=0)
         await self.close()
         self._closing, self.crashed = False, None
         self._asked.clear()
         try:
-            await self._start(wanted)
+            await self._start(order)
         except (Problem, BenchError):
             await self.close()
             self._closing = False
             await self._start(before)
             raise
-        self._order = wanted
+        self._order = order
         self._call_back()
 
     # -- looking at what happened --------------------------------------------------------------------------
@@ -534,7 +534,7 @@ class Bench:
         return Program(self.picture.units[unit].model)
 
 
-def _again(endpoint: EndpointPicture) -> Wanted:
+def _again(endpoint: EndpointPicture) -> EndpointSpec:
     """The same endpoint once more; a pseudo-terminal without a link has another name each time."""
     bare = endpoint.kind == "pty" and endpoint.address.startswith("/dev/pts/")
-    return Wanted(endpoint.kind, "" if bare else endpoint.address)
+    return EndpointSpec(endpoint.kind, "" if bare else endpoint.address)

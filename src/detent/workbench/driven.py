@@ -22,10 +22,10 @@ from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.leaving import CERTAIN
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.states import News, Standing, Weight
+from detent.realtime.cell_source import CellSource
 from detent.realtime.loop import Companion, ServedLine, stopped_by_signals, wake_exactly
 from detent.realtime.pace import Pace, WallNs
 from detent.realtime.service import build_with_images
-from detent.realtime.target import Target
 from detent.ticks import MS, Ns
 from detent.uart import Chars
 from detent.workbench import rotors
@@ -46,7 +46,7 @@ class DrivenEngine(Engine):
 
     # -- made -------------------------------------------------------------------------------------------
 
-    def _begin(self, found: Target) -> Cell:
+    def _begin(self, found: CellSource) -> Cell:
         self._found, self._reports = found, list[str]()
         self._marks: list[Mark] = []
         self._told_marks: tuple[Mark, ...] = ()
@@ -55,7 +55,7 @@ class DrivenEngine(Engine):
         self._boards = opened = Opened(described, read, RealPins(self._news))
         self._opening.callback(opened.boards.close)
         stores = HeldStores(no_store if images is None else images.save)
-        serial = any(wanted.kind == "serial" for wanted in self._order.wanted)
+        serial = any(spec.kind == "serial" for spec in self._order.endpoints)
         line_timing = self._order.line_timing and not serial
         real = build_with_images(
             described, read, images, line_timing, self._reports, True, stores.save, opened.inputs
@@ -77,7 +77,7 @@ class DrivenEngine(Engine):
         self._views = views(cell, shafts)
         return cell
 
-    def _alike(self, found: Target, line_timing: bool) -> Cell:
+    def _alike(self, found: CellSource, line_timing: bool) -> Cell:
         kept = {} if self._images is None else self._images.load()[0]
         return build(found.description, found.read, images=kept, store=self._stores.save, record=True,
                      line_timing=line_timing, inputs=self._boards.inputs)  # fmt: skip

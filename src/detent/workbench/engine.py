@@ -40,6 +40,7 @@ from detent.outputs.units import views
 from detent.pins import Level
 from detent.realtime import breaking
 from detent.realtime.belonging import safe
+from detent.realtime.cell_source import CellSource, find_cell
 from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
 from detent.realtime.images import Images, ImagesUnusable, cell_name
 from detent.realtime.loop import BEHIND, Companion, Loop, ServedLine, stopped_by_signals, wake_exactly
@@ -47,7 +48,6 @@ from detent.realtime.names import Names
 from detent.realtime.pace import Lateness as Counted
 from detent.realtime.pace import Pace, WallNs
 from detent.realtime.service import build_with_images, models, open_endpoints
-from detent.realtime.target import Target, target
 from detent.realtime.verbs import VERBS
 from detent.ticks import SECOND, Ns
 from detent.uart import Chars
@@ -104,7 +104,7 @@ class Engine:
             self._opened = open_endpoints(
                 found.description,
                 cell,
-                order.wanted,
+                order.endpoints,
                 opening,
                 placed=order.placed,
                 link=self._link if order.state_dir is not None else None,
@@ -125,8 +125,8 @@ class Engine:
 
     # -- made anew ---------------------------------------------------------------------------------------
 
-    def _find(self) -> Target:
-        return target(self._order.target, straps=self._order.straps, options=self._order.options)
+    def _find(self) -> CellSource:
+        return find_cell(self._order.target, straps=self._order.straps, options=self._order.options)
 
     def _open_images(self, description: Description) -> Images | None:
         folder = self._order.state_dir
@@ -143,11 +143,11 @@ class Engine:
             link.unlink()  # the cell is ours alone, so it was left behind; its terminal may be another's by now
         return link
 
-    def _begin(self, found: Target) -> Cell:
+    def _begin(self, found: CellSource) -> Cell:
         """A new cell, with nothing behind it."""
         self._found, self._reports = found, list[str]()
         self._stores = Stores(self._images.save) if self._images is not None else Stores()
-        serial = any(wanted.kind == "serial" for wanted in self._order.wanted)  # the wire outside takes the time
+        serial = any(spec.kind == "serial" for spec in self._order.endpoints)  # the wire outside takes the time
         line_timing = self._order.line_timing and not serial
         cell = build_with_images(
             found.description, found.read, self._images, line_timing, self._reports, True, self._stores.save

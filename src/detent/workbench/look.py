@@ -149,7 +149,7 @@ def units(history: History) -> dict[str, UnitState]:
     """The units where the cell stands."""
     cell, names = history.cell, history.cell.wiring.names
     held: dict[int, set[str]] = {}
-    for unit, pin in cell.hands:
+    for unit, pin in cell.forced:
         held.setdefault(unit, set()).add(pin)
     controllers = cell.controllers()
     return {

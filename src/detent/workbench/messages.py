@@ -13,7 +13,7 @@ from detent.cell.recording import Batch
 from detent.motors.rotor import Floats
 from detent.outputs.units import UnitView
 from detent.pins import Level
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.ticks import Ns
 
 # -- the picture: what there is to draw -------------------------------------------------------------------------
@@ -252,7 +252,7 @@ class Order(NamedTuple):
     target: str
     straps: tuple[str, ...]
     options: tuple[str, ...]
-    wanted: tuple[Wanted, ...]
+    endpoints: tuple[EndpointSpec, ...]
     pace: float | None
     line_timing: bool
     state_dir: Path | None
@@ -260,7 +260,7 @@ class Order(NamedTuple):
     actions: tuple[TimedAction, ...] = ()  # to be done first, each at its time: those of an engine that is gone
     until: Ns = 0  # as far as it had come
     memory: int = 512  # MB, about, that everything may take: what is older than fits is dropped
-    placed: Mapping[str, tuple[Wanted, ...]] = {}  # where its lines were served, by name
+    placed: Mapping[str, tuple[EndpointSpec, ...]] = {}  # where its lines were served, by name
     real: bool = False  # drive the pins of the boards in the cell file
 
 

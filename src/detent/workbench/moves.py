@@ -18,7 +18,7 @@ from detent.motors.named import MOTORS
 from detent.motors.rotor import Rig
 from detent.moves import laws
 from detent.moves.law import Law, clipped, in_force, stepping
-from detent.realtime.target import target
+from detent.realtime.cell_source import find_cell
 from detent.workbench import motion
 from detent.workbench.live import Live
 from detent.workbench.motion import Floats, Picture
@@ -122,7 +122,7 @@ class Moves:
 
     def _described(self) -> Description | None:
         try:
-            return target(self._bench.picture.target).description
+            return find_cell(self._bench.picture.target).description
         except Problem:
             return None
 

@@ -42,7 +42,7 @@ class _Message(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True)
 
 
-class Wanted(_Message):
+class TriggerCondition(_Message):
     """A trigger as a window sets it: an edge of a pin, a curve that crosses `level`, or ``error``."""
 
     source: str
@@ -59,10 +59,10 @@ class View(_Message):
     begin: Instant
     end: Instant
     cursors: tuple[Instant | None, Instant | None] = (None, None)
-    trigger: Wanted | None = None  # holds a view that follows
+    trigger: TriggerCondition | None = None  # holds a view that follows
 
 
-class Find(Wanted):
+class Find(TriggerCondition):
     """Ask for the next moment from `begin` on (`direction` 1), or the one before (-1), at which the trigger is met."""
 
     begin: Annotated[Instant, Field(alias="from")]
@@ -91,7 +91,7 @@ class Feed:
         self._traces: dict[str, Trace] = {}
         self._shown: tuple[Ns, int] | None = None  # the present of the last frame, and the cut of the bench then
         self._found: Ns | None = None  # where the trigger was met last
-        self._searched: tuple[Wanted, int, Ns] | None = None  # trigger, cut, and up to when it was looked for
+        self._searched: tuple[TriggerCondition, int, Ns] | None = None  # trigger, cut, and up to when it was looked for
 
     async def serve(self) -> None:
         """From the socket's opening to its end."""
@@ -233,7 +233,7 @@ class Feed:
         value = math.nan if at is None else self._bench.value_at(key, at)
         return None if math.isnan(value) else value
 
-    def _last_trigger(self, wanted: Wanted, span: Ns) -> Ns | None:
+    def _last_trigger(self, wanted: TriggerCondition, span: Ns) -> Ns | None:
         """Where the trigger was met last, so long ago that what follows fills the view."""
         state, cut = self._bench.state, self._bench.cut
         until = state.now - round(span * (1 - BEFORE))
@@ -247,7 +247,7 @@ class Feed:
             self._found = met[-1] if met else self._found
         return self._found
 
-    def _search(self, wanted: Wanted, begin: Ns, end: Ns, most: int) -> list[Ns]:
+    def _search(self, wanted: TriggerCondition, begin: Ns, end: Ns, most: int) -> list[Ns]:
         """When the trigger is met, in order. ValueError for a trace that there is not."""
         if wanted.source == "error":
             return self._bench.search(Trigger("error"), begin, end, most)

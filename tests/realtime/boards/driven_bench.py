@@ -127,7 +127,7 @@ class Bench:
 
     def type(self, unit: str, text: str) -> None:
         """The host of a unit sends a line, now: when the cell is at its present."""
-        self.send(unit, self.cell.talker(unit).frame(text))
+        self.send(unit, self.cell.serial_unit(unit).frame(text))
 
     def send(self, unit: str, data: bytes) -> None:
         self.loop._catch_up()

@@ -12,7 +12,7 @@ from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.states import News
 from detent.realtime.control import Control
-from detent.realtime.endpoints.wanted import Wanted
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.service import Service
 from detent.realtime.verbs import AskedWrongly
 from detent.ticks import MS, SECOND
@@ -38,7 +38,7 @@ def made(text: str, port: FakePort | None = None, **options: object) -> tuple[Se
     wall, news = Wall(), []
     fake = port or FakePort(FakeBoard(moves=400))
     real = RealPins(news.append, lambda address: fake, wall, wall.sleep)
-    service = Service(parse(text, "cell.toml"), no_file, [Wanted("tcp", "127.0.0.1:0")], real=real, observed=True,
+    service = Service(parse(text, "cell.toml"), no_file, [EndpointSpec("tcp", "127.0.0.1:0")], real=real, observed=True,
                       line_timing=False, **options)  # type: ignore[arg-type]  # fmt: skip
     service._loop._wait = lambda r, w, x, s: (*wall.sleep(r, w, 0.02 if s is None else min(s, 0.02)), ())  # type: ignore[assignment,return-value]
     service.restart_clock()
@@ -100,7 +100,7 @@ def test_what_would_fool_a_motor_is_refused(
 
 def test_without_real_pins_there_is_nothing_to_stop() -> None:
     with (
-        Service(parse(CELL, "cell.toml"), no_file, [Wanted("tcp", "127.0.0.1:0")], observed=True) as service,
+        Service(parse(CELL, "cell.toml"), no_file, [EndpointSpec("tcp", "127.0.0.1:0")], observed=True) as service,
         pytest.raises(AskedWrongly, match="no real pins are driven; serve the cell with --real"),
     ):
         Control(service).do("stop", {})

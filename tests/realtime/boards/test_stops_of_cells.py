@@ -48,7 +48,7 @@ def ideal(case: Case) -> Cell:
     made = build(parse(text, "cell.toml"), no_file, line_timing=False)
     for pause, line in case.sends:
         made.run_to(made.now + pause)
-        made.send(0, made.talker("x").frame(line)) if len(line) > 1 else made.send(0, line.encode())
+        made.send(0, made.serial_unit("x").frame(line)) if len(line) > 1 else made.send(0, line.encode())
     made.run_to(made.now + case.lasts)
     return made
 

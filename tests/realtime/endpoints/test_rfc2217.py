@@ -14,9 +14,9 @@ from tests.realtime.ticking import TickingCell, look
 from detent.cell.description import single
 from detent.lines.line import Heard
 from detent.realtime.endpoints.rfc2217 import QUIET, Rfc2217Port
+from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.endpoints.tcp import TcpAddress
 from detent.realtime.endpoints.telnet import COM_PORT, DO, DONT, ECHO, SUPPRESS_GO_AHEAD, WILL, parameters, wish
-from detent.realtime.endpoints.wanted import Wanted
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace
 from detent.realtime.service import Service
@@ -31,8 +31,8 @@ pyserials = pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarni
 @contextmanager
 def served() -> Iterator[str]:
     """A GS-C200 behind RFC 2217: the URL."""
-    wanted = [Wanted("rfc2217", "127.0.0.1:0")]
-    with Service(single("gs-c200"), lambda file: "", wanted, pace=20) as service:
+    endpoints = [EndpointSpec("rfc2217", "127.0.0.1:0")]
+    with Service(single("gs-c200"), lambda file: "", endpoints, pace=20) as service:
         serving = threading.Thread(target=service.run)
         serving.start()
         try:

@@ -101,10 +101,10 @@ def test_traces_are_added_and_removed_and_remembered(scope: Window) -> None:
 def test_the_wheel_zooms_about_the_pointer_and_a_drag_pans(scope: Window) -> None:
     held_at(scope, 5)
     drag(scope, (0.2, 150), (0.3, 150))
-    scope.until(f"() => !{SCOPE}.following && {SCOPE}.hands.drag === null")
+    scope.until(f"() => !{SCOPE}.following && {SCOPE}.input.drag === null")
     before = value(scope, "view")
     drag(scope, (0.5, 150), (0.4, 150))
-    scope.until(f"(begin) => {SCOPE}.view.begin > begin && {SCOPE}.hands.drag === null", before["begin"])
+    scope.until(f"(begin) => {SCOPE}.view.begin > begin && {SCOPE}.input.drag === null", before["begin"])
     panned = value(scope, "view")
     assert panned["end"] - panned["begin"] == pytest.approx(before["end"] - before["begin"])
     box = scope.page.locator(".scope canvas").bounding_box()
@@ -124,7 +124,7 @@ def test_a_drag_on_the_time_axis_shows_just_that_range(scope: Window) -> None:
     box = scope.page.locator(".scope canvas").bounding_box()
     drag(scope, (0.25, 10), (0.5, 10))
     left, right = (view["begin"] + part * box["width"] / width * (view["end"] - view["begin"]) for part in (0.25, 0.5))
-    scope.until(f"(begin) => {SCOPE}.view.begin !== begin && {SCOPE}.hands.drag === null", view["begin"])
+    scope.until(f"(begin) => {SCOPE}.view.begin !== begin && {SCOPE}.input.drag === null", view["begin"])
     zoomed = value(scope, "view")
     assert zoomed["begin"] == pytest.approx(left, abs=2e7)
     assert zoomed["end"] == pytest.approx(right, abs=2e7)
@@ -280,13 +280,13 @@ def test_two_fingers_zoom_on_a_phone(windows: Windows, workbench: Served) -> Non
     view = value(window, "view")
     for places in ((150,), (150, 200)):
         touch("touchStart", *places)
-        window.until(f"(fingers) => {SCOPE}.hands.pointers.size === fingers", len(places))
+        window.until(f"(fingers) => {SCOPE}.input.pointers.size === fingers", len(places))
     touch("touchMove", 100, 250)
     touch("touchMove", 75, 275)
     quarter = (view["end"] - view["begin"]) / 4
     window.until(f"(span) => Math.abs({SCOPE}.view.end - {SCOPE}.view.begin - span) < 0.02 * span", quarter)
     touch("touchEnd")
-    window.until(f"() => {SCOPE}.hands.pointers.size === 0")
+    window.until(f"() => {SCOPE}.input.pointers.size === 0")
     assert value(window, "following") is False
 
 

@@ -1,7 +1,7 @@
 /* The Scope page: puts plot, hands, tools and feed together. Several windows have each their own view. */
 
 import { Feed } from "./scope_feed.js";
-import { Hands, KEYS } from "./scope_hands.js";
+import { ScopeInput, KEYS } from "./scope_input.js";
 import { Plot, showTime } from "./scope_plot.js";
 import { Tools, element } from "./scope_tools.js";
 
@@ -43,7 +43,7 @@ class Scope {
     );
     root.replaceChildren(tools, this.strip, this.place);
     this.plot = new Plot(canvas);
-    this.hands = new Hands(canvas, this);
+    this.input = new ScopeInput(canvas, this);
     this.tools = new Tools(tools, this);
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
     this.feed = new Feed(`${scheme}//${location.host}${root.dataset.feed}`, {

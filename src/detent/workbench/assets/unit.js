@@ -240,7 +240,7 @@ part("unit", (box) => {
   }
 
   async function hand(what, value) {
-    const sent = await tried(() => call("unit_hand", chosen, what, value));
+    const sent = await tried(() => call("unit_move", chosen, what, value));
     if (sent) role("sent").textContent = sent.length ? `sent ${sent.join(", ")}` : "nothing had to be sent";
   }
 

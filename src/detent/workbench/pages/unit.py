@@ -80,7 +80,7 @@ def markup() -> str:
 <div class="bench" data-role="bench" hidden>
 <div class="warning" role="alert" data-role="trouble" hidden><span class="grow"></span>
  <button class="key small primary" data-role="again">Ask again</button></div>
-<div class="side">{_front(rates)}{_hands()}</div><div class="side">{_line()}{_keeps()}</div></div></div>"""
+<div class="side">{_front(rates)}{_manual()}</div><div class="side">{_line()}{_keeps()}</div></div></div>"""
 
 
 def _front(rates: str) -> str:
@@ -97,7 +97,7 @@ def _front(rates: str) -> str:
 <span class="grow" data-role="took"></span></div></section>"""
 
 
-def _hands() -> str:
+def _manual() -> str:
     jogs = "".join(
         f'<button class="key" data-jog="{sign}" aria-label="{text}, jog {word}">{text}</button>'
         for sign, word, text in ((-1, "minus", "&minus; step"), (1, "plus", "+ step"))
@@ -106,7 +106,8 @@ def _hands() -> str:
         f'<button class="key hold" data-hold="{sign}" aria-label="{text}: run {word}">{text}</button>'
         for sign, word, text in ((-1, "minus", "&minus; hold"), (1, "plus", "hold +"))
     )
-    return f"""<section class="panel hand" aria-label="Hands"><div class="panel-head"><h2 class="grow">Hands</h2>
+    return f"""<section class="panel hand" aria-label="Manual control">
+<div class="panel-head"><h2 class="grow">Manual control</h2>
 <button class="key small stop" data-role="stop" data-help="By its ramp; again: at once. Esc twice stops everything.">
 STOP</button></div><div class="fields">
 <label><span>Jog by</span><input class="field mono" data-role="by" type="number" step="any" value="100"></label>

@@ -22,7 +22,7 @@ def lines_of(assembly: Assembly[Any]) -> list[str]:
     return [f"{placed.address} {placed.text}" for placed in assembly.placed]
 
 
-def wanted_of(assembly: Assembly[Any]) -> list[str]:
+def numbered_lines_of(assembly: Assembly[Any]) -> list[str]:
     """An instruction with its address a line, in their order: to be compared with `places_of`."""
     return [f"{placed.address:4} {placed.text}" for placed in sorted(assembly.placed)]
 

@@ -24,9 +24,9 @@ from detent.workbench.folder import Folder
 from detent.workbench.live import Live
 from detent.workbench.stopping import Stopping
 from detent.workbench.talk import Row
-from detent.workbench.units import hands
+from detent.workbench.units import manual
 from detent.workbench.units.backups import backup_of, check_fits, explained, file_before
-from detent.workbench.units.programs import lines_of, places_of, source_of, wanted_of
+from detent.workbench.units.programs import lines_of, numbered_lines_of, places_of, source_of
 from detent.workbench.units.transcript import HOST
 from detent.workbench.units.unit import RATES, Unit, options_of
 
@@ -35,7 +35,7 @@ Name = Annotated[str, Field(max_length=200)]
 Line = Annotated[str, Field(max_length=300)]
 Text = Annotated[str, Field(max_length=1 << 20)]
 Rate = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
-Hand = Literal["jog", "go", "zero", "home"]
+ManualMove = Literal["jog", "go", "zero", "home"]
 MOST = 16  # units at once
 
 
@@ -47,7 +47,7 @@ class Units:
         self._live, self._stopping, self._folder, self._state = live, stopping, folder, state
         self._units: dict[str, Unit] = {}
         live.put({"r.names": []})
-        for call in (self.unit_connect, self.unit_again, self.unit_leave, self.unit_say, self.unit_both, self.unit_hand,
+        for call in (self.unit_connect, self.unit_again, self.unit_leave, self.unit_say, self.unit_both, self.unit_move,
                      self.unit_hold, self.unit_held, self.unit_stop, self.unit_asking, self.unit_talk, self.unit_source,
                      self.unit_compare, self.unit_store, self.unit_backup, self.unit_differs,
                      self.unit_restore):  # fmt: skip
@@ -101,22 +101,22 @@ class Units:
 
     # -- hands -------------------------------------------------------------------------------------------
 
-    async def unit_hand(self, name: Name, what: Hand, value: int = 0) -> list[str]:
+    async def unit_move(self, name: Name, what: ManualMove, value: int = 0) -> list[str]:
         """Jog by `value` steps, go to it, call where the axis stands zero, find home; what was sent, in words."""
         unit = self._unit(name)
         axis = _axis(unit)
         steps: Steps[None]
         match what:
             case "jog":
-                steps, words = hands.jog(axis, value), f"jog {value:+d}"
+                steps, words = manual.jog(axis, value), f"jog {value:+d}"
             case "go":
-                steps, words = hands.go_to(axis, value), f"go to {value}"
+                steps, words = manual.go_to(axis, value), f"go to {value}"
             case "zero":
-                steps, words = hands.set_zero(axis), "set zero"
+                steps, words = manual.set_zero(axis), "set zero"
             case "home":
-                if unit.able.home:
-                    raise ValueError(unit.able.home)
-                steps, words = hands.home(axis, value or -1), "home"
+                if unit.manual.home:
+                    raise ValueError(unit.manual.home)
+                steps, words = manual.home(axis, value or -1), "home"
         return await self._shown(unit, unit.perform(words, steps))
 
     async def unit_hold(self, name: Name, rate: Rate) -> list[str]:
@@ -208,7 +208,7 @@ class Units:
         unit = self._unit(name)
         assembly = await asyncio.to_thread(_assembled, unit, source)
         there = await unit.perform("comparing the program", places_of(unit.shell.driver, assembly))
-        return list(unified_diff(there, wanted_of(assembly), "the unit", "the text", lineterm="", n=2))
+        return list(unified_diff(there, numbered_lines_of(assembly), "the unit", "the text", lineterm="", n=2))
 
     async def unit_store(self, name: Name, source: Text, save: bool = False) -> str:
         """Store a program, verified; with `save` it is kept over a power-off, too. It is not started."""

@@ -17,8 +17,8 @@ from detent.realtime.connect import connect_async, host
 from detent.workbench.live import Value
 from detent.workbench.stopping import StopFailed
 from detent.workbench.units.asked import Look, look
-from detent.workbench.units.hands import Can, can
-from detent.workbench.units.hands import run as run_at
+from detent.workbench.units.manual import ManualMoves, manual_moves
+from detent.workbench.units.manual import run as run_at
 from detent.workbench.units.tap import Tap
 from detent.workbench.units.transcript import Transcript
 
@@ -89,12 +89,12 @@ class Unit:
         shell.port = unit.tap
         unit.shell = shell
         unit.written = " ".join(f"{key}={value}" for key, value in options.items())
-        unit.able = can(shell.driver)
+        unit.manual = manual_moves(shell.driver)
         return unit
 
     shell: Asynchronous
     tap: Tap
-    able: Can
+    manual: ManualMoves
 
     def __init__(self, name: str, model: str, address: str, told: Callable[["Unit"], None]) -> None:
         """Use `open`."""
@@ -149,14 +149,14 @@ class Unit:
     def facts(self) -> dict[str, Value]:
         """Everything that windows show of it."""
         seen = self.seen
-        able = self.able
+        manual = self.manual
         return {
             "model": self.model, "address": self.address, "options": self.written, "lost": self.tap.lost,
             "trouble": self.trouble, "state": seen.state if seen else None, "moving": seen.moving if seen else None,
             "position": seen.position if seen else None, "last": self.last, "rate": seen.rate if seen else None,
             "facts": [list(fact) for fact in seen.facts] if seen else [], "paused": self.paused, "asking": self.rate,
             "took": round(self.took, 4), "job": self.job, "progress": list(self.progress), "outcome": self.outcome,
-            "stopping": self._stopping is not None, "held": self._held_until > 0, "can": able._asdict(),
+            "stopping": self._stopping is not None, "held": self._held_until > 0, "can": manual._asdict(),
             "talk": self.tap.transcript.count,
         }  # fmt: skip
 
@@ -268,8 +268,8 @@ class Unit:
 
     async def hold(self, rate: float) -> None:
         """Run at `rate` as long as `still_held` is called. Raises as `perform`."""
-        if self.able.hold:
-            raise ValueError(self.able.hold)
+        if self.manual.hold:
+            raise ValueError(self.manual.hold)
         driver = self.shell.driver
         assert isinstance(driver, Axis)
         self._held_until = asyncio.get_running_loop().time() + HOLD_SECONDS

@@ -1,4 +1,4 @@
-"""What a hand does to an axis, as operations of its driver, and so in the controller's own commands."""
+"""Moving an axis manually, as operations of its driver, and so in the controller's own commands."""
 
 from typing import Final, NamedTuple
 
@@ -11,8 +11,8 @@ from detent.hosts.supersigma import Supersigma
 FARTHEST: Final = 100_000_000  # steps by hand: a slip of the keyboard is longer
 
 
-class Can(NamedTuple):
-    """Why a hand cannot do something with an axis, in words; "" where it can. `unit`: what its steps are."""
+class ManualMoves(NamedTuple):
+    """Why an axis cannot be moved so by hand, in words; "" where it can. `unit`: what its steps are."""
 
     hold: str
     home: str
@@ -21,8 +21,8 @@ class Can(NamedTuple):
     before_home: str  # what a person should know before
 
 
-def can(driver: Axis) -> Can:
-    """What a hand can do with the axis of `driver`."""
+def manual_moves(driver: Axis) -> ManualMoves:
+    """How the axis of `driver` can be moved by hand."""
     hold = home = before_hold = before_home = ""
     unit = "steps"
     match driver:
@@ -38,7 +38,7 @@ def can(driver: Axis) -> Can:
                 "half steps",
                 "It always goes backward, to the end of the rail.",
             )
-    return Can(hold, home, unit, before_hold, before_home)
+    return ManualMoves(hold, home, unit, before_hold, before_home)
 
 
 def jog(driver: Axis, steps: int) -> Steps[None]:

@@ -1,4 +1,4 @@
-"""Endpoints as they are asked for in a cell file or on the command line."""
+"""Endpoints as a cell file or the command line specifies them."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -13,14 +13,14 @@ from detent.uart import Chars, Format
 _LISTENING = ("tcp", "rfc2217")  # those that are a HOST:PORT
 
 
-class Wanted(NamedTuple):
+class EndpointSpec(NamedTuple):
     """An endpoint of some kind, and where: a link or nothing for a pty, HOST:PORT for tcp and rfc2217, a device."""
 
     kind: str
     where: str = ""
 
     @classmethod
-    def parse(cls, text: str) -> "Wanted":
+    def parse(cls, text: str) -> "EndpointSpec":
         """Read pty, pty:LINK, tcp:HOST:PORT, rfc2217:HOST:PORT or serial:DEVICE. Raises ValueError."""
         kind, _, where = text.partition(":")
         if kind not in ("pty", *_LISTENING, "serial") or (kind != "pty" and not where):
@@ -29,13 +29,13 @@ class Wanted(NamedTuple):
             )
         return cls(kind, where).checked()
 
-    def checked(self) -> "Wanted":
+    def checked(self) -> "EndpointSpec":
         """Itself, if `where` can be understood. Raises ValueError."""
         if self.kind in _LISTENING:
             TcpAddress.parse(self.where)
         return self
 
-    def of_several(self, number: int, name: str) -> "Wanted":
+    def of_several(self, number: int, name: str) -> "EndpointSpec":
         """The same for line `number`, called `name`, of several.
 
         A link gets the name appended; ports other than 0 count up. Raises ValueError if it cannot be shared out.

@@ -10,7 +10,7 @@ const TAP = 5; // px that a pointer may move in a tap
 
 export const KEYS = "arrows pan and zoom, f follows, 0 shows everything, a and b place the cursors, Esc removes them";
 
-export class Hands {
+export class ScopeInput {
   constructor(place, scope) {
     this.place = place;
     this.scope = scope;

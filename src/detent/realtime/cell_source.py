@@ -1,4 +1,4 @@
-"""What is run, served or looked at: a model by name, or a cell file."""
+"""Where a cell comes from that is run, served or looked at: a model by name, or a cell file."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from detent.pins import PinKind
 from detent.realtime.texts import read_text
 
 
-class Target(NamedTuple):
+class CellSource(NamedTuple):
     """A cell to be built: its description, how to read the files it names, and a name for what it writes."""
 
     description: Description
@@ -20,14 +20,14 @@ class Target(NamedTuple):
     inputs: tuple[Path, ...] = ()  # every file that it is read from
 
 
-def target(
+def find_cell(
     text: str,
     *,
     straps: Sequence[str] = (),
     options: Sequence[str] = (),
     programs: Sequence[str] = (),
     pins: Sequence[str] = (),
-) -> Target:
+) -> CellSource:
     """The cell that `text` (MODEL or CELL.toml) means. Straps, options and pins are written NAME=VALUE.
 
     For a cell they say which unit: UNIT.NAME=VALUE, and programs UNIT=FILE. A pin is an input that is held at a level
@@ -48,7 +48,7 @@ def target(
         files = [*of_motors]
         files += [file for unit in description.units.values() for file in (unit.program, unit.eeprom) if file]
         inputs = (path, *(path.parent / file for file in files))
-        return Target(description, lambda file: read_text(path.parent / file), path.stem, inputs)
+        return CellSource(description, lambda file: read_text(path.parent / file), path.stem, inputs)
     try:
         catalogue.model(text)
     except catalogue.CatalogueError as error:
@@ -62,7 +62,7 @@ def target(
         program=programs[0] if programs else None,
     )
     description = _with_pins(description, pins, text)
-    return Target(description, lambda file: read_text(Path(file)), text, tuple(map(Path, programs)))
+    return CellSource(description, lambda file: read_text(Path(file)), text, tuple(map(Path, programs)))
 
 
 def _pair(flag: str, item: str) -> tuple[str, str]:
