@@ -117,6 +117,14 @@ class Ended(Protocol[Out]):
         """What does nothing behind the last instruction: put there for a label that stands there and is jumped to."""
 
 
+@runtime_checkable
+class Remains(Protocol):
+    """What a language has besides in whose memory the rest of an older program may stand behind the end of another."""
+
+    def left_over(self, image: bytes) -> list[range]:
+        """The bytes of an image that belong to no program, though they are not blank."""
+
+
 class SourceError(NamedTuple):
     """One thing wrong with a source: line and column count from 1; the message holds a remedy."""
 
@@ -473,7 +481,8 @@ def listing(assembly: Assembly[Ins]) -> str:
 def disassemble(language: Language[Ins], image: bytes) -> str:
     """Source that assembles to `image`, with a label `at_N` where a jump leads. Raises ImageError.
 
-    A jump to no instruction of the image keeps its number, and a comment says so if the language is closed.
+    A jump to no instruction of the image keeps its number, and a comment says so if the language is closed. What is
+    left of an older program is told in comments.
     """
     decoded = language.decode(image)
     starts = {address for address, _ in decoded}
@@ -492,4 +501,7 @@ def disassemble(language: Language[Ins], image: bytes) -> str:
         if target is not None and target not in starts and language.closed:
             text += f"  {language.comment} no instruction starts at {target}"
         lines.append(text)
+    for left in language.left_over(image) if isinstance(language, Remains) else ():
+        data = image[left.start : left.stop].hex(" ").upper()
+        lines.append(f"{language.comment} left of an older program at {left.start}, behind an end mark: {data}")
     return "".join(line + "\n" for line in lines)

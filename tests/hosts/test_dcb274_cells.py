@@ -195,6 +195,17 @@ def test_programs_are_stored_listed_run_traced_and_ended() -> None:
     assert unit.listing(0).end == 45
 
 
+def test_what_is_left_behind_an_end_mark_is_a_program_only_where_a_jump_leads_to_it() -> None:
+    _, unit = alone()
+    unit.write_program(["W 1", "W 2", "W 3", "W 4"], 300)
+    unit.write_program(["W 9"], 300)
+    assert unit.read_program()[-2:] == ["P 300", "W 9"]
+    assert unit.left_over == "304-311"
+    unit.write_program(["J 306 0"], 400)
+    assert unit.read_program()[-7:] == ["P 300", "W 9", "P 306", "W 3", "W 4", "P 400", "J 306 0"]
+    assert unit.left_over == "304-305"
+
+
 def test_a_program_that_somebody_else_has_started_is_stopped_and_not_taken_for_a_dead_line() -> None:
     cell, unit = alone()
     unit.write_program(["M 1000", "L 2048 0"])
@@ -454,7 +465,7 @@ def test_a_backup_has_what_the_unit_keeps_as_text_too(backup: dict[str, object])
     assert isinstance(memory, list)
     assert len(memory) == 128
     assert memory[0].startswith("0f 00 00 00")  # O: the letter's code less 40h
-    assert backup["program"] == ["P 0", "O 0", "R 400", "P 10", "@", "W 100", "Z 0", "G 0 0", "P 1600", "A 8"]
+    assert backup["program"] == ["P 0", "O 0", "R 400", "P 1600", "A 8"]  # not what is left of the factory's
     assert isinstance(parameters, dict)
     assert {key: parameters[key] for key in ("name", "divide", "initial_velocity", "slew_velocity", "decay")} == {
         "name": "Q", "divide": 1, "initial_velocity": 300, "slew_velocity": 9572, "decay": 30,

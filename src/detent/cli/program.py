@@ -1,6 +1,7 @@
 """The verbs `upload`, `download` and `compare`: program source, and the program memory of a unit."""
 
 import json as json_text
+import re
 import sys
 from collections.abc import Callable, Sequence
 from difflib import unified_diff
@@ -122,6 +123,10 @@ def download(
     language = _language(model)
     with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
         lines = _programmed(found).read_program()
+        left = getattr(found.driver, "left_over", "")
+    if left:
+        what = f"left over from an older program at {left}, behind an end mark, where no jump leads: not in this source"
+        print(f"detent: {what}; Q {re.split('[-,]', left)[0]} lists it", file=sys.stderr)
     source = source_of(language, lines)
     if file is not None:
         try:
@@ -130,6 +135,7 @@ def download(
             failed(f"{file}: not written: {error.strerror or error}")
     if json:
         facts = {"model": model, "port": port, "file": str(file) if file else None, "lines": lines, "source": source}
+        facts |= {"left_over": left} if left else {}
         print(json_text.dumps(facts))
     elif file is not None:
         print(f"Wrote {file}: {source.count(chr(10))} lines")

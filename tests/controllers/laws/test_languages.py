@@ -170,6 +170,20 @@ def units_keep_programs(model: str, text: str) -> bool:
     return True
 
 
+def what_is_left_over_is_no_program(start: int, long: list[str], short: list[str]) -> bool:
+    """A DCB-274 keeps the rest of a longer program behind the end mark of a shorter one (page 47)."""
+    cell, driver = module("dcb-274")
+    wanted = [*(driver.read_program() if start else []), f"P {start}", *short]
+    driver.write_program(long, start)
+    driver.write_program(short, start)
+    assert driver.read_program() == wanted, "download has what is left over"
+    assert driver.left_over, "nothing is said of it"
+    memory = cell.controller("u").kept_memory()
+    smc = catalogue.language("dcb-274")
+    assert places(assemble(smc, disassemble(smc, memory))) == places(assemble(smc, "\n".join(wanted)))
+    return True
+
+
 LANGUAGES = [name for name in ("gs-c200", "gs-c200s", "dcb-274") if name not in OPEN.get("languages", ())]
 every_language = pytest.mark.parametrize("model", LANGUAGES)
 
@@ -198,6 +212,15 @@ def test_the_eeprom_file_is_taken_for_an_image(model: str, tmp_path: Path) -> No
 @every_language
 def test_units_keep_programs(model: str) -> None:
     check(units_keep_programs, model, 8, 4)
+
+
+def test_what_is_left_over_is_no_program() -> None:
+    def make(draw: Random) -> tuple[History, tuple[int, list[str], list[str]]]:
+        long = [f"{draw.choice('+-')} {n}" for n in draw.sample(range(1, 60_000), 7)]
+        short = [f"W {n}" for n in draw.sample(range(9999), 4)][: draw.choice((3, 4))]
+        return History({}, (), ()), (draw.choice((0, 256, 300, 1600)), long, short)
+
+    assert hold(lambda _, made: what_is_left_over_is_no_program(*made), make, 4, "what is left over") == 4
 
 
 @pytest.mark.slow

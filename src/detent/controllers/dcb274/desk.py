@@ -11,8 +11,8 @@ from typing import Final, Protocol
 from detent.controllers.dcb274 import commands, settings
 from detent.controllers.dcb274.commands import ROWS, Instruction, Op, Refusal
 from detent.controllers.dcb274.link import CR, LF, NO_NAME, Mode, is_name
-from detent.controllers.dcb274.memory import PAGE, PARAMETERS, PROTECTED, SHADOW, SIZE
-from detent.controllers.dcb274.program import END, allowed, encode
+from detent.controllers.dcb274.memory import PAGE, PARAMETERS, PROTECTED, SIZE
+from detent.controllers.dcb274.program import END, SHADOW, allowed, encode
 from detent.controllers.dcb274.running import Running
 from detent.controllers.dcb274.work import Work
 from detent.controllers.device import Output, Refused, StoreImage

@@ -26,9 +26,10 @@ from detent.controllers.dcb274.link import (
     is_name,
     next_name,
 )
-from detent.controllers.dcb274.memory import POWER_UP, SIZE, Memory
+from detent.controllers.dcb274.memory import SIZE, Memory
 from detent.controllers.dcb274.motion import Motion, News
 from detent.controllers.dcb274.ports import Ports
+from detent.controllers.dcb274.program import POWER_UP
 from detent.controllers.dcb274.running import Running
 from detent.controllers.dcb274.settings import Settings
 from detent.controllers.dcb274.trip import Trip

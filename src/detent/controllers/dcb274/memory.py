@@ -10,11 +10,10 @@ from typing import Final
 from detent.assembler import ImageError
 from detent.controllers.dcb274 import program
 from detent.controllers.dcb274.commands import Instruction, Op
+from detent.controllers.dcb274.program import SHADOW
 
 SIZE: Final = 2048
 PAGE: Final = 256
-SHADOW: Final = range(128, 192)
-POWER_UP: Final = 1600  # "if a valid command exists", it is executed on power-up
 PROTECTED: Final = range(247, 256)  # from C 1
 PARAMETERS: Final = range(193, 256)  # no byte of a program may stand there
 

@@ -7,6 +7,7 @@ numbers little-endian, positions as 24-bit two's complement, speeds as timer cou
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,6 +19,11 @@ from detent.controllers.dcb274.commands import MODEL, ROWS, TABLE, Instruction, 
 
 END: Final = 0xFF
 AREAS: Final = (range(193), range(256, 2048))  # where bytes of a program may stand (page 59)
+SHADOW: Final = range(128, 192)  # programs there run from RAM (page 32)
+BRANCHES: Final = range(256, 512, 16)  # where G 2048 leads to, by the ports (page 39)
+POWER_UP: Final = 1600  # what stands there is executed at power-up
+_BEGUN: Final = (range(SHADOW.start), range(SHADOW.start, 193), range(256, POWER_UP), range(POWER_UP, 2048))
+MOST_MARKS: Final = 4  # FFh in a row inside what is left of a program: an end mark and the three bytes of a number
 LONGEST: Final = max(row.length for row in TABLE)
 _BIT_15: Final = 0x80  # of the high byte
 
@@ -161,22 +167,69 @@ class SmcLanguage:
     def decode(self, image: bytes) -> list[tuple[int, Instruction]]:
         """The instructions of an image that starts at address 0; FFh and what nobody wrote is left out.
 
-        Of a whole NV memory (2 048 bytes) only the program areas are read.
+        Of a whole NV memory (2 048 bytes) only the program areas are read, and there what is left of an older program
+        behind the end mark of a shorter one is none (`left_over`).
         """
+        if len(image) == AREAS[-1].stop:
+            return sorted(place for part in self._programs(image).values() for place in part)
         found, address = [], 0
-        whole = len(image) == AREAS[-1].stop
         while address < len(image):
-            if whole and not allowed(address):
-                address = AREAS[1].start
             if image[address] == END:
                 address += 1
                 continue
-            instruction = decode(image[address : address + LONGEST])
-            if instruction is None or not _typed(instruction, image, address):
-                raise Damaged(f"byte {address} holds {image[address]:02X}h, with which no instruction begins")
+            instruction = _first(image, address)
             found.append((address, instruction))
             address += ROWS[instruction.op].length
         return found
+
+    def left_over(self, image: bytes) -> list[range]:
+        """The bytes of a whole NV memory that stand behind an end mark and belong to no program.
+
+        A program that is stored over a longer one leaves the rest of that one in memory (page 47).
+        """
+        if len(image) != AREAS[-1].stop:
+            return []
+        held = {
+            byte
+            for part in self._programs(image).values()
+            for at, instruction in part
+            for byte in range(at, at + ROWS[instruction.op].length)
+        }
+        left: list[range] = []
+        for at in (at for area in AREAS for at in area if image[at] != END and at not in held):
+            joined = bool(left) and at == left[-1].stop
+            left[-1:] = [range(left[-1].start, at + 1)] if joined else [*left[-1:], range(at, at + 1)]
+        return left
+
+    def _programs(self, image: bytes) -> dict[int, list[tuple[int, Instruction]]]:
+        """The instructions of each program of a whole NV memory, by where it begins."""
+        parts: dict[int, list[tuple[int, Instruction]]] = {}
+        for area in _BEGUN:
+            at = area.start
+            while at < area.stop:
+                under_way = next((part for part in parts.values() if at in _bytes(part)), None)
+                if under_way is None and image[at] == END:
+                    at += 1
+                    continue
+                part = under_way or parts.setdefault(at, _part(image, at))
+                at = _behind(image, _bytes(part).stop, area)
+        asked = set(parts)
+        while places := self._led_to(parts) - asked:
+            at = min(places)
+            asked.add(at)
+            if image[at] != END and not any(at in _bytes(part) for part in parts.values()):
+                try:
+                    parts[at] = _part(image, at)
+                except Damaged:
+                    continue
+        return parts
+
+    def _led_to(self, parts: Mapping[int, list[tuple[int, Instruction]]]) -> set[int]:
+        """Where programs lead, by the ports too."""
+        instructions = [instruction for part in parts.values() for _, instruction in part]
+        branches = any(one.op is Op.GO and one.values[0] == commands.BRANCH for one in instructions)
+        places = {place for one in instructions if (place := self.target(one)) is not None}
+        return {place for place in places | (set(BRANCHES) if branches else set()) if allowed(place)}
 
     def spell(self, instruction: Instruction, label: str | None = None) -> str:
         """As Q lists it; with a label, as source has it."""
@@ -187,6 +240,44 @@ class SmcLanguage:
         words = text.split(" ")
         words[1 + place] = label
         return " ".join(words)
+
+
+def _first(image: bytes, address: int) -> Instruction:
+    """The instruction at an address of an image. Raises Damaged."""
+    instruction = decode(image[address : address + LONGEST])
+    if instruction is None or not _typed(instruction, image, address):
+        raise Damaged(f"byte {address} holds {image[address]:02X}h, with which no instruction begins")
+    return instruction
+
+
+def _part(image: bytes, address: int) -> list[tuple[int, Instruction]]:
+    """A program from where it begins to its end mark, or to where no program may stand. Raises Damaged."""
+    part: list[tuple[int, Instruction]] = []
+    while allowed(address) and image[address] != END:
+        part.append((address, _first(image, address)))
+        address += ROWS[part[-1][1].op].length
+    return part
+
+
+def _bytes(part: list[tuple[int, Instruction]]) -> range:
+    """The bytes that a program takes, without its end mark."""
+    last, instruction = part[-1]
+    return range(part[0][0], last + ROWS[instruction.op].length)
+
+
+def _behind(image: bytes, end: int, area: range) -> int:
+    """Where in `area` another program may begin behind the end mark at `end`, past what is left over there."""
+    at, most = end, 1  # end marks that belong together: the one at `end`, or those in what is left over
+    while at < area.stop:
+        begun = at
+        while at < area.stop and image[at] == END:
+            at += 1
+        if at - begun > most:
+            return at
+        while at < area.stop and image[at] != END:
+            at += 1
+        most = MOST_MARKS
+    return at
 
 
 def _typed(instruction: Instruction, image: bytes, address: int) -> bool:

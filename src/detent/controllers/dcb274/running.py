@@ -9,12 +9,10 @@ from typing import NamedTuple
 
 from detent.controllers.dcb274 import commands
 from detent.controllers.dcb274.commands import BRANCH, ROWS, Instruction, Op
+from detent.controllers.dcb274.program import BRANCHES
 from detent.controllers.dcb274.work import Work
 from detent.controllers.device import Executing, Output
 from detent.ticks import MS, NEVER, Ns
-
-BRANCH_TABLE = 256  # G 2048: plus 16 for each value of the ports (page 39)
-_BRANCH_STEP = 16
 
 
 class Stage(Enum):
@@ -276,7 +274,7 @@ class Running:
         return self._work.ports.port(condition // 2 + 1) is (condition % 2 == 0)
 
     def _branch(self, address: int) -> int:
-        return BRANCH_TABLE + _BRANCH_STEP * self._work.ports.ports() if address == BRANCH else address
+        return BRANCHES[self._work.ports.ports()] if address == BRANCH else address
 
 
 _NOTHING = Instruction(Op.RETIRED, (0,))

@@ -5,9 +5,10 @@ instructions; k gives it the special trip counter, at which a k or an i is looke
 """
 
 from detent.controllers.dcb274.commands import Instruction, Op
-from detent.controllers.dcb274.memory import SHADOW, Memory
+from detent.controllers.dcb274.memory import Memory
 from detent.controllers.dcb274.motion import Motion
 from detent.controllers.dcb274.ports import Ports
+from detent.controllers.dcb274.program import SHADOW
 from detent.controllers.dcb274.settings import SPECIAL, Settings
 from detent.ticks import Ns
 

@@ -11,16 +11,13 @@ from typing import Final, NamedTuple
 from detent.hosts.dcb274.answers import Listed, Listing
 from detent.hosts.dcb274.commands import CELLS_AT_ONCE, Commands
 from detent.hosts.dcb274.handshake import CR, SingleMode
+from detent.hosts.dcb274.programs import END, NO_PROGRAM, SHADOW, SIZE, behind, holds, led_to, left_over
 from detent.hosts.dcb274.ranges import LARGEST_ADDRESS, between, program_address
 from detent.hosts.errors import BadAnswer, Busy, DriverError, Refused, Spoken
 from detent.hosts.exchange import Ask, Progress, Steps, operation
 
-SIZE: Final = LARGEST_ADDRESS + 1
-END: Final = 0xFF  # ends a program (page 47)
 PAGE: Final = 20  # lines of a listing (page 48)
 BYTES_A_LINE: Final = 16  # of a backup
-SHADOW: Final = range(128, 192)  # programs there run from RAM, which S copies to NV memory (page 32)
-NO_PROGRAM: Final = range(193, 256)
 STATUS_BYTE, NAME = 228, 247  # "do NOT modify" (page 31); the name
 _OPTIONS_AT, _DIVIDE_AT, _JOG_AT, _RAMP_AT, _TRIP_AT, _PORTS_AT, _TABLE_AT = 227, 229, 238, 240, 242, 245, 246
 _STORING: Final = 0.05  # seconds for one instruction of program mode
@@ -81,8 +78,9 @@ class Memory(Commands):
     def read_program(self, address: int | None = None) -> Steps[list[str]]:
         """The program at `address`, or every program of the memory, as lines that `write_program` takes.
 
-        A line ``P 256`` says where the next ones stand. Programs are looked for behind each end mark, which takes the
-        bytes of the whole memory: about ten seconds at 9600 baud. Single mode only.
+        A line ``P 256`` says where the next ones stand. Programs are looked for in the bytes of the whole memory,
+        which takes about ten seconds at 9600 baud. What is left of an older program behind an end mark is none
+        (`programs`): `left_over` tells where it stands. Single mode only.
         """
         if address is not None:
             program_address(address)
@@ -93,7 +91,8 @@ class Memory(Commands):
 
     def _programs(self, memory: bytes) -> Steps[list[str]]:
         """Every program, found by the bytes that are no end mark; and the one in RAM at 128, whatever NV memory has."""
-        found, places, address = [], [], 0
+        found: dict[int, Listing] = {}
+        address = 0
         while address < SIZE:
             if address in NO_PROGRAM:
                 address = NO_PROGRAM.stop
@@ -103,10 +102,19 @@ class Memory(Commands):
                 yield Progress(address, SIZE, "listing programs")
                 listing = yield from self.listing(address)
                 if listing.lines:
-                    found.append(listing)
-                    places.append(address)
-                address = max(listing.end, address + 1)
-        return _source(found, places)
+                    found[address] = listing
+                    address = behind(memory, max(listing.end, address + 1))
+                else:
+                    address += 1
+        asked: set[int] = set()
+        while places := [at for at in led_to(found.values()) - asked if memory[at] != END and not holds(found, at)]:
+            asked.add(min(places))
+            listing = yield from self.listing(min(places))
+            if listing.lines:
+                found[min(places)] = listing
+        left = left_over(memory, found)
+        self.left_over = _spans(left) if left else ""
+        return _source([found[at] for at in sorted(found)], sorted(found))
 
     @operation
     def write_program(self, lines: Sequence[str], address: int = 0) -> Steps[list[Listed]]:

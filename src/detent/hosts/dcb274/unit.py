@@ -58,6 +58,7 @@ class Unit(Axis):
         self.title = self._way.title
         self.version = ""  # as the sign-on line tells
         self.programming = False  # a line of ours has begun program mode: lines are stored
+        self.left_over = ""  # where the last look at all programs found what is left of older ones, like "7-20, 300"
         self._connected = False
         self._stops = 0  # how often the axis was stopped
         self._times_told = 0  # how often it was told to do something else
