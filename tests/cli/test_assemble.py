@@ -42,9 +42,9 @@ def test_asm_writes_an_image_hex_or_commands(source: Path, tmp_path: Path, capsy
     output = tmp_path / "out"
     asm("gs-c200s", source, output=output)
     assert output.read_bytes() == IMAGE
-    asm("gs-c200s", source, output=output, format="hex")
+    asm("gs-c200s", source, output=output, format="hex", force=True)
     assert output.read_text() == "53 0A 00 00 6A 00\n"
-    asm("gs-c200s", source, output=output, format="commands")
+    asm("gs-c200s", source, output=output, format="commands", force=True)
     assert output.read_text() == "S10\nj0\n"
     capsys.readouterr()
     asm("gs-c200s", source, format="hex")
@@ -150,8 +150,8 @@ def test_an_image_needs_a_file_and_a_folder_that_is_there(
 ) -> None:
     assert status(lambda: asm("gs-c200s", source, format="image")) == 2
     assert "--output" in capsys.readouterr().err
-    assert status(lambda: asm("gs-c200s", source, output=tmp_path / "no" / "x")) == 1
-    assert "not written" in capsys.readouterr().err
+    assert status(lambda: asm("gs-c200s", source, output=tmp_path / "no" / "x")) == 2
+    assert "there is no folder" in capsys.readouterr().err
 
 
 def test_a_source_saved_with_a_byte_order_mark_is_read(source: Path, capsys: pytest.CaptureFixture[str]) -> None:

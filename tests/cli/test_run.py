@@ -182,11 +182,11 @@ def test_a_wrong_choice_is_one_line_with_the_remedy_and_exit_status_2(
     assert error.count("\n") == (1 if said else 0)
 
 
-def test_a_file_that_cannot_be_written_exits_with_1_and_names_it(
+def test_a_folder_that_is_not_there_is_named_before_anything_is_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     target = tmp_path / "no folder" / "out.vcd"
-    assert detent("run", "gs-c200", "--vcd", str(target)) == 1
+    assert detent("run", "gs-c200", "--vcd", str(target)) == 2
     assert str(target.parent) in capsys.readouterr().err
 
 
@@ -367,7 +367,7 @@ def test_an_output_replaces_what_a_run_has_made_and_nothing_else_unasked(
     file = tmp_path / ("out.svg" if kind == "plot" else "out")
     file.write_text("mine")
     assert detent("run", "gs-c200", f"--{kind}", str(file)) == 2
-    assert "was not made by a run" in capsys.readouterr().err
+    assert "is there: write to another file, or over it with --force" in capsys.readouterr().err
     assert file.read_text() == "mine"
     assert detent("run", "gs-c200", f"--{kind}", str(file), "--force") == 0
     assert detent("run", "gs-c200", f"--{kind}", str(file)) == 0
@@ -380,8 +380,8 @@ def test_an_output_replaces_what_a_run_has_made_and_nothing_else_unasked(
 def test_a_device_that_is_full_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert detent("run", "gs-c200", "--vcd", "/dev/full") == 1
     assert capsys.readouterr().err == "detent: /dev/full: cannot write it: No space left on device\n"
-    assert detent("run", "gs-c200", "--vcd", "/nonexistent/x.vcd") == 1
-    assert capsys.readouterr().err == "detent: /nonexistent/x.vcd: cannot write it: No such file or directory\n"
+    assert detent("run", "gs-c200", "--vcd", "/nonexistent/x.vcd") == 2
+    assert capsys.readouterr().err == "detent: /nonexistent/x.vcd: cannot write it: there is no folder /nonexistent\n"
 
 
 def test_a_large_file_is_told_beforehand_and_termination_leaves_no_part_of_it(tmp_path: Path) -> None:

@@ -117,6 +117,6 @@ def test_a_bad_line_of_a_file_is_named(tmp_path: Path, capsys: Capture) -> None:
         assert message in capsys.readouterr().err
 
 
-def test_a_file_that_cannot_be_written_is_a_failure(tmp_path: Path, capsys: Capture) -> None:
-    assert detent("table", "--bin", tmp_path / "no" / "t.bin") == 1
+def test_a_folder_that_is_not_there_is_named(tmp_path: Path, capsys: Capture) -> None:
+    assert detent("table", "--bin", tmp_path / "no" / "t.bin") == 2
     assert "cannot write it" in capsys.readouterr().err

@@ -16,7 +16,7 @@ from detent.assembler import (
     disassemble,
     listing,
 )
-from detent.outputs.files import NotOurs, check_inputs, write_whole
+from detent.outputs.files import InTheWay, check_outputs, write_whole
 
 FAILED = 1
 ASKED_WRONGLY = 2
@@ -28,6 +28,7 @@ def asm(
     *,
     output: Path | None = None,
     format: Literal["image", "hex", "commands"] | None = None,
+    force: bool = False,
     json: bool = False,
 ) -> None:
     """Assemble a program: labels and comments in, commands or an image out.
@@ -44,18 +45,20 @@ def asm(
     file
         The source.
     output
-        A file to write; it is replaced whole or not at all.
+        A file to write, whole or not at all.
     format
         What to write: the image as bytes (the default for a file), the image in hex, or the commands (the
         default for the terminal).
+    force
+        Write over a file that is there.
     json
         Print everything as JSON: commands, addresses, labels, image, bytes used.
     """
     if format == "image" and output is None:
         raise _asked_wrongly("an image is bytes and needs a file: add --output FILE, or choose --format hex")
+    _check_output(output, file, force)
     assembly = _assembly(model, file, json)
     if output is not None:
-        _keep_input(output, file)
         _write(output, _formatted(assembly, format or "image"))
     if json:
         _print_json({**_facts(assembly), "output": str(output) if output else None})
@@ -85,7 +88,7 @@ def list_(model: str, file: Path, *, json: bool = False) -> None:
         print(listing(assembly), end="")
 
 
-def disasm(model: str, file: Path, *, output: Path | None = None, json: bool = False) -> None:
+def disasm(model: str, file: Path, *, output: Path | None = None, force: bool = False, json: bool = False) -> None:
     """Turn a program image back into source, with labels for its jumps.
 
     The EEPROM file of a unit that `serve` keeps is taken as well.
@@ -97,13 +100,16 @@ def disasm(model: str, file: Path, *, output: Path | None = None, json: bool = F
     file
         The image that `asm` wrote, or an EEPROM file.
     output
-        A file to write instead of the terminal; it is replaced whole or not at all.
+        A file to write instead of the terminal, whole or not at all.
+    force
+        Write over a file that is there.
     json
         Print the source and its facts as JSON.
     """
     from detent.realtime.images import ImageUnreadable, image_in
 
     language = _language(model)
+    _check_output(output, file, force)
     try:
         image = image_in(_read(file), model)
         source = disassemble(language, image)
@@ -112,7 +118,6 @@ def disasm(model: str, file: Path, *, output: Path | None = None, json: bool = F
     except ImageError as error:
         raise _asked_wrongly(f"{file}: {error}; is it an image for the {model}?") from error
     if output is not None:
-        _keep_input(output, file)
         _write(output, source.encode())
     if json:
         written = str(output) if output else None
@@ -204,10 +209,10 @@ def _read(file: Path) -> bytes:
         raise _asked_wrongly(f"{file}: {error.strerror or error}") from error
 
 
-def _keep_input(output: Path, file: Path) -> None:
+def _check_output(output: Path | None, file: Path, force: bool) -> None:
     try:
-        check_inputs(output, [file])
-    except NotOurs as error:
+        check_outputs([output], [file], asked=force)
+    except InTheWay as error:
         raise _asked_wrongly(str(error)) from error
 
 

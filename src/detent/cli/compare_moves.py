@@ -25,6 +25,7 @@ def compare_moves(
     variants: int = 512,
     seed: int = 1,
     plot: Path | None = None,
+    overwrite: bool = False,
     json: bool = False,
 ) -> None:
     """Compare settings: times, loss rates, torque used.
@@ -51,6 +52,8 @@ def compare_moves(
         Of the draws: the same seed draws the same variants.
     plot
         Draw speed and torque used: a .png, .svg or .pdf file.
+    overwrite
+        Write over a file that no run has drawn.
     json
         Print everything as one line of JSON.
     """
@@ -59,6 +62,7 @@ def compare_moves(
     from detent.moves.law import winding_of
     from detent.moves.spelling import read
     from detent.outputs import figures
+    from detent.outputs.files import check_outputs
     from detent.tuner.compare import compare
     from detent.tuner.task import Task, check_rig, moves_of
 
@@ -67,6 +71,7 @@ def compare_moves(
             raise ValueError(f'{len(settings)} settings: give two to {MOST}, each in quotes: "S=48 T=604 R=202"')
         if plot is not None:
             figures.check(plot)
+            check_outputs([plot], [Path(motor)], asked=overwrite, option="--overwrite")
         laws = [(text, *read(model, text.replace(";", " ").split())) for text in settings]
         windings = {winding_of(law, rig.step).name for _, law, _ in laws}
         if len(windings) > 1:

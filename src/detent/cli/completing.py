@@ -107,7 +107,9 @@ def with_choices() -> Iterator[None]:
             function.__annotations__ = before
 
 
-def install(*, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path | None = None) -> None:
+def install(
+    *, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path | None = None, force: bool = False
+) -> None:
     """Write the script that completes detent in your shell.
 
     Your shell reads it when it starts the next time.
@@ -118,10 +120,17 @@ def install(*, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path
         Which shell; without it the one that runs.
     output
         Write the script to this file, and change nothing else.
+    force
+        Write over a file that is there.
     """
     from detent.cli import application
     from detent.cli.endings import asked_wrongly, failed
+    from detent.outputs.files import InTheWay, check_outputs
 
+    try:
+        check_outputs([output], asked=force)
+    except InTheWay as error:
+        asked_wrongly(error)
     try:
         with with_choices():
             whole = application("*")

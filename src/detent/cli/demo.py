@@ -16,7 +16,9 @@ TOLD = "drilling"  # the example whose story is told
 LONGEST = 20  # seconds of the others: some of them run for ever
 
 
-def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bool = False) -> None:
+def demo(
+    name: str = "drilling", *, output: Path = Path("detent-demo"), force: bool = False, json: bool = False
+) -> None:
     """Run an example cell, tell what happens, and draw it.
 
     `detent examples` lists them.
@@ -27,19 +29,27 @@ def demo(name: str = "drilling", *, output: Path = Path("detent-demo"), json: bo
         Which example.
     output
         The folder for the figure and the waveforms; made if it is not there.
+    force
+        Write over files there that no run has made.
     json
         Print the timeline and the result as JSON.
     """
     from detent.cell.build import build
     from detent.cli import outcome
-    from detent.cli.endings import failed
+    from detent.cli.endings import asked_wrongly, failed
     from detent.cli.examples import place as example
     from detent.outputs.figures import check
+    from detent.outputs.files import InTheWay, check_outputs
     from detent.realtime.cell_source import find_cell
     from detent.ticks import SECOND
 
     place = example(name) / "cell.toml"
     check(output / f"{name}.png")
+    try:
+        if output.is_dir():
+            check_outputs([output / f"{name}.png", output / f"{name}.vcd"], asked=force)
+    except InTheWay as error:
+        asked_wrongly(error)
     found = find_cell(str(place))
     cell = build(found.description, found.read)
     until = LONGEST * SECOND

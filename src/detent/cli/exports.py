@@ -39,7 +39,7 @@ class ExportFiles(NamedTuple):
 
     def check(self, inputs: Sequence[Path], *, force: bool) -> None:
         """ValueError for files that cannot be written so, before anything is run."""
-        from detent.outputs.files import check_place
+        from detent.outputs.files import check_outputs
 
         if self.plot is not None:
             from detent.outputs.figures import check
@@ -50,13 +50,7 @@ class ExportFiles(NamedTuple):
         if self.frequency < 1:
             what = "a clock has 1 tick a second or more, like 12000000"
             raise ValueError(f"--steps-frequency {self.frequency}: {what}")
-        seen: set[Path] = set()
-        for path in self.paths:
-            if path.resolve() in seen:
-                raise ValueError(f"{path}: two outputs cannot go to one file: give each its own")
-            seen.add(path.resolve())
-            if not force:
-                check_place(path, inputs)
+        check_outputs(self.paths, inputs, asked=force)
 
 
 def write(cell: "Cell", source: "CellSource", files: ExportFiles) -> None:

@@ -43,6 +43,7 @@ def motor(
     sensitivity: bool = False,
     pull_in: bool = False,
     plot: Path | None = None,
+    overwrite: bool = False,
     json: bool = False,
 ) -> None:
     """Say what a motor makes of its pulses: torque against speed, a move judged.
@@ -77,6 +78,8 @@ def motor(
         The highest speed that this motor starts into without a ramp.
     plot
         Draw it: a .png, .svg or .pdf file.
+    overwrite
+        Write over a file that no run has drawn.
     json
         Print everything as one line of JSON.
     """
@@ -90,8 +93,10 @@ def motor(
             return
         if plot is not None:
             from detent.outputs import figures
+            from detent.outputs.files import check_outputs
 
             figures.check(plot)
+            check_outputs([plot], [Path(name)], asked=overwrite, option="--overwrite")
         of_a_move = {
             "--as": as_, "--vary": vary, "--sensitivity": sensitivity or None, "--start": start, "--slew": slew,
             "--ramp": ramp, "--variants": variants,

@@ -112,15 +112,17 @@ def download(
     from detent.cli.endings import asked_wrongly, failed
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
-    from detent.outputs.files import write_whole
+    from detent.outputs.files import InTheWay, check_outputs, write_whole
     from detent.workbench.units.programs import source_of
 
     if file is not None and output is not None:
         asked_wrongly(f"two files: {file} and --output {output}; say one")
     file = output if file is None else file
-    if file is not None and file.exists() and not force:
-        asked_wrongly(f"{file} is there: write to another file, or over it with --force")
     language = _language(model)
+    try:
+        check_outputs([file], asked=force)
+    except InTheWay as error:
+        asked_wrongly(error)
     with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
         lines = _programmed(found).read_program()
         left = getattr(found.driver, "left_over", "")

@@ -80,7 +80,7 @@ def run(
     allow_loss
         A motor that loses steps is told, and no failure.
     force
-        Write over files that were not made by a run.
+        Write over files that no run has made.
     json
         Print the result as one line of JSON.
     """

@@ -55,7 +55,7 @@ def service(
     from detent.cell.description import Problem
     from detent.cli.endings import asked_wrongly, failed
     from detent.cli.serve import _address
-    from detent.outputs.files import write_whole
+    from detent.outputs.files import check_outputs, write_whole
     from detent.realtime.cell_source import find_cell
 
     try:
@@ -70,9 +70,8 @@ def service(
         who = user if user is not None else getpass.getuser()
         if not re.fullmatch(r"[a-z_][a-z0-9_-]*\$?", who):
             raise Problem("", "--user", f"{who!r} is no name of a user")
-        if output is not None and output.exists() and not force:
-            raise Problem("", "--output", f"{output} is there already: write over it with --force, or elsewhere")
-    except Problem as problem:
+        check_outputs([output], [Path(cell)], asked=force)
+    except ValueError as problem:
         asked_wrongly(problem)
     remarks = _remarks(found.description, who)
     for remark in () if json else remarks:

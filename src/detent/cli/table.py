@@ -27,6 +27,7 @@ def table(
     bin_: Annotated[Path | None, Parameter(name="--bin")] = None,
     hex_: Annotated[Path | None, Parameter(name="--hex")] = None,
     text: Path | None = None,
+    force: bool = False,
     option: bool = False,
     json: bool = False,
 ) -> None:
@@ -61,20 +62,20 @@ def table(
         Write them in Intel HEX.
     text
         Write a listing: t, V, N and the difference, entry by entry.
+    force
+        Write over files that are there.
     option
         Print only the line that the option `table` of the model supersigma takes.
     json
         Print everything as JSON.
     """
     from detent.cli.endings import asked_wrongly, failed
-    from detent.outputs.files import check_inputs, write_whole
+    from detent.outputs.files import check_outputs, write_whole
     from detent.ramps.differences import EPROM, CurveError, compiled
     from detent.ramps.hex_records import intel_hex
 
     try:
-        for path in (bin_, hex_, text):
-            if path is not None:
-                check_inputs(path, [Path(curve)])
+        check_outputs((bin_, hex_, text), [Path(curve)], asked=force)
         clocks = _clocks(interval)
         wanted = {"peak": peak, "angular": angular, "phase": phase, "low": low, "high": high}
         law, seconds, name = _curve(curve, {key: value for key, value in wanted.items() if value is not None}, duration)

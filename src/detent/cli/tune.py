@@ -210,6 +210,7 @@ def _check(
     outputs: list[Path], maps: list[Path], from_: Path | None, into: Path | None, overwrite: bool, each: bool
 ) -> None:
     from detent.outputs import figures
+    from detent.outputs.files import check_outputs
 
     if from_ is not None and into is None:
         raise ValueError("--from: where to? Name another file with --into")
@@ -218,11 +219,7 @@ def _check(
     for path in maps:
         if path.suffix.lower() != ".csv":
             figures.check(path)
-    for path in outputs:
-        if from_ is not None and path.exists() and from_.exists() and path.samefile(from_):
-            raise ValueError(f"{path} is read here, and would be lost: write to another file")
-        if path.exists() and not overwrite:
-            raise ValueError(f"{path} is there already: write to another file, or over it with --overwrite")
+    check_outputs(outputs, [] if from_ is None else [from_], asked=overwrite, option="--overwrite")
     if from_ is not None and not from_.is_file():
         raise ValueError(f"--from {from_}: there is no such file")
 

@@ -1,7 +1,7 @@
 """Files that are written whole or not at all, and never in the place of somebody else's."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
@@ -14,21 +14,34 @@ _MARKS = (MARK, b"axis,direction,base,interval,count,add")  # the head of a step
 _LOOKED_AT = 4096  # bytes at each end
 
 
-class NotOurs(ValueError):
-    """A file that is in the way of an output. The text says what to do."""
+class InTheWay(ValueError):
+    """An output that cannot go where it should. The text says what to do."""
 
 
-def check_place(path: Path, inputs: Sequence[Path] = ()) -> None:
-    """Raise NotOurs if an output to `path` would replace one of the `inputs`, or a file that no run has made."""
-    check_inputs(path, inputs, "write to another file, or over it with --force")
-    if path.is_file() and not _is_ours(path):
-        raise NotOurs(f"{path} was not made by a run: write to another file, or over it with --force")
+def check_outputs(
+    paths: Iterable[Path | None], inputs: Iterable[Path] = (), *, asked: bool = False, option: str = "--force"
+) -> None:
+    """The rule for every file that a verb writes; raises InTheWay before anything is done. None is no file.
 
-
-def check_inputs(path: Path, inputs: Sequence[Path], remedy: str = "write to another file") -> None:
-    """Raise NotOurs if an output to `path` would replace one of the `inputs`, under whatever name."""
-    if any(path.exists() and one.exists() and path.samefile(one) for one in inputs):
-        raise NotOurs(f"{path} is read here, and would be lost: {remedy}")
+    No file takes the place of another unasked: `asked` says that this was asked for, by the `option`. What a run has
+    drawn or recorded itself makes room for a newer one. Whatever is asked, what is read here is not written over, and
+    two outputs do not go to one file.
+    """
+    read, seen = list(inputs), set[Path]()
+    for path in paths:
+        if path is None:
+            continue
+        if any(path.exists() and one.exists() and path.samefile(one) for one in read):
+            raise InTheWay(f"{path} is read here, and would be lost: write to another file")
+        if path.resolve() in seen:
+            raise InTheWay(f"{path}: two outputs cannot go to one file: give each its own")
+        seen.add(path.resolve())
+        if not path.parent.is_dir():
+            raise InTheWay(f"{path}: cannot write it: there is no folder {path.parent}")
+        if path.is_dir():
+            raise InTheWay(f"{path}: cannot write it: it is a folder; name a file in it")
+        if path.is_file() and not asked and not _is_ours(path):
+            raise InTheWay(f"{path} is there: write to another file, or over it with {option}")
 
 
 def _is_ours(path: Path) -> bool:

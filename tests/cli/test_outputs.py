@@ -1,0 +1,126 @@
+"""No verb writes over a file unasked: one rule, held against every verb that writes one."""
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from detent.cli import VERBS, main
+
+MINE = "mine\n"
+
+# The verb and what it writes, a line that writes it to {out}, and how it is asked to write over what is there.
+OUTPUTS = {
+    ("demo", "output"): ("demo menu --output {folder}", "--force"),
+    ("run", "plot"): ("run gs-c200 --plot {out}.png", "--force"),
+    ("run", "vcd"): ("run gs-c200 --vcd {out}.vcd", "--force"),
+    ("run", "sr"): ("run gs-c200 --for 1ms --sr {out}.sr", "--force"),
+    ("run", "npz"): ("run gs-c200 --npz {out}.npz", "--force"),
+    ("run", "steps"): ("run gs-c200 --steps {out}.csv", "--force"),
+    ("service", "output"): ("service {cell} --output {out}", "--force"),
+    ("asm", "output"): ("asm gs-c200 {source} --output {out}", "--force"),
+    ("disasm", "output"): ("disasm gs-c200 {image} --output {out}", "--force"),
+    ("download", "output"): ("download gs-c200 /dev/no-such-port --output {out}", ""),
+    ("download", "file"): ("download gs-c200 /dev/no-such-port {out}", ""),
+    ("motor", "plot"): ("motor qsh4218-41-10-035 --supply 24 --plot {out}.png", "--overwrite"),
+    ("compare-moves", "plot"): (
+        "compare-moves gs-c200 S=1 S=2 --motor qsh4218-41-10-035 --moves 10 --supply 24 --plot {out}.png", ""),
+    ("tune", "map_"): ("tune gs-c200 --motor qsh4218-41-10-035 --supply 24 --moves 200 --map {out}.csv", ""),
+    ("tune", "into"): ("tune gs-c200 --motor qsh4218-41-10-035 --supply 24 --moves 200 --into {out}", ""),
+    ("table", "bin_"): ("table --bin {out}", "--force"),
+    ("table", "hex_"): ("table --hex {out}", "--force"),
+    ("table", "text"): ("table --text {out}", "--force"),
+    ("examples", "folder"): ("examples copy menu {out}", ""),
+    ("--install-completion", "output"): ("--install-completion --shell bash --output {out}", "--force"),
+}  # fmt: skip
+
+# Files that are read, or, for a backup, get a number where one is there (test_backup).
+READ = {
+    ("asm", "file"), ("list", "file"), ("disasm", "file"), ("backup", "file"), ("restore", "file"), ("upload", "file"),
+    ("compare", "file"), ("tune", "from_"), ("tune", "batch"), ("workbench", "folder"),
+}  # fmt: skip
+SERVED = {("serve", name) for name in ("pty", "serial", "state")} | {
+    ("workbench", x) for x in ("pty", "serial", "state")
+}
+
+
+@pytest.fixture
+def names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Path]:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    (tmp_path / "cell.toml").write_text('[units.u]\nmodel = "gs-c200"\n')
+    (tmp_path / "source").write_text("+100\n")
+    (tmp_path / "image").write_bytes(bytes.fromhex("ffff"))
+    (tmp_path / "folder").mkdir()
+    names = {"out": tmp_path / "out", "cell": tmp_path / "cell.toml", "folder": tmp_path / "folder"}
+    main_quietly("asm", "gs-c200", str(tmp_path / "source"), "--output", str(tmp_path / "image.bin"))
+    return {**names, "source": tmp_path / "source", "image": tmp_path / "image.bin"}
+
+
+def main_quietly(*words: str) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    return int(ended.value.code or 0)
+
+
+def places(line: str, names: dict[str, Path]) -> list[Path]:
+    """The files that a line writes."""
+    if "{folder}" in line:
+        return [names["folder"] / "menu.png", names["folder"] / "menu.vcd"]
+    suffix = next((word[5:] for word in line.split() if word.startswith("{out}")), "")
+    return [names["out"].with_name("out" + suffix)]
+
+
+@pytest.mark.parametrize("what", OUTPUTS, ids=lambda what: "-".join(what))
+def test_a_file_that_is_there_stays_unless_it_is_asked_for(
+    what: tuple[str, str], names: dict[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    line, asked = OUTPUTS[what]
+    files = places(line, names)
+    for file in files:
+        file.write_text(MINE)
+    words = line.format(**names).split()
+    assert main_quietly(*words) == 2
+    err = capsys.readouterr().err
+    assert f"{files[0]} is there: " in err
+    assert err.count("\n") == 1
+    assert [file.read_text() for file in files] == [MINE] * len(files)
+    if asked:
+        assert f"over it with {asked}" in err
+        assert main_quietly(*words, asked) == 0, capsys.readouterr().err
+        assert all(MINE.encode() != file.read_bytes() for file in files)
+
+
+def test_what_a_run_has_made_makes_room_for_a_newer_one(names: dict[str, Path]) -> None:
+    for _ in range(2):
+        assert main_quietly("run", "gs-c200", "--vcd", f"{names['out']}.vcd", "--plot", f"{names['out']}.png") == 0
+
+
+@pytest.mark.parametrize("words", [
+    "table {source} --hex {source} --force",
+    "asm gs-c200 {source} --output {source} --force",
+    "disasm gs-c200 {image} --output {image} --force",
+    "run {cell} --vcd {cell} --force",
+    "service {cell} --output {cell} --force",
+    "table --bin {out} --hex {out} --force",
+    "run gs-c200 --vcd {out} --npz {out}",
+])  # fmt: skip
+def test_what_is_read_is_never_written_over_and_two_outputs_have_two_files(
+    words: str, names: dict[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {name: file.read_bytes() for name, file in names.items() if file.is_file()}
+    assert main_quietly(*words.format(**names).split()) == 2
+    err = capsys.readouterr().err
+    assert "is read here, and would be lost" in err or "two outputs cannot go to one file" in err
+    assert {name: file.read_bytes() for name, file in names.items() if file.is_file()} == before
+
+
+def test_every_file_that_a_verb_is_given_is_in_the_table() -> None:
+    places = {**{verb: place for verb, (place, _) in VERBS.items()},
+              "--install-completion": "detent.cli.completing:install"}  # fmt: skip
+    given = set()
+    for verb, place in places.items():
+        module, name = place.split(":")
+        found = getattr(import_module(module), name)
+        given |= {(verb, parameter) for parameter, kind in found.__annotations__.items() if "Path" in str(kind)}
+    assert given == set(OUTPUTS) | READ | SERVED
