@@ -125,7 +125,7 @@ def file_of_the_eeprom_is_taken(model: str, text: str, folder: Path) -> bool:
     unit.restore(verbs._formatted(made, "image"))
     file = folder / "u.eeprom"
     file.write_bytes(pack(unit.kept_memory(), model))
-    verbs.disasm(model, file, output=folder / "u.src")
+    verbs.disasm(model, file, output=folder / "u.src", force=True)
     again = taken(model, (folder / "u.src").read_text())
     assert again is not None, "what disasm makes of the EEPROM file is refused"
     found = places(again)
