@@ -11,8 +11,9 @@ import numpy as np
 from bench.rows import Row, measure, print_table
 from detent.hosts.interpolation import CLOCK_HZ, line
 from detent.ramps.differences import PAPER
-from detent.ramps.short_movements import Way, cuts, family, movement
+from detent.ramps.short_movements import cuts, family, movement
 from detent.ramps.table_movement import ramped
+from detent.ramps.ways import Way
 
 ENTRIES = len(PAPER.differences)
 BANDS = ((404, 1000), (1000, 2600), (2600, 5144), (404, 5144))

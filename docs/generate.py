@@ -31,7 +31,8 @@ from detent.controllers.supersigma.program import OFFSET
 from detent.pins import LOW, PinDriver
 from detent.ramps.differences import PAPER
 from detent.ramps.rate_generator import CLOCK_HZ
-from detent.ramps.short_movements import Way, choose, movement
+from detent.ramps.short_movements import choose, movement
+from detent.ramps.ways import Way
 from detent.realtime import openapi, verbs
 from detent.ticks import show_duration
 

@@ -14,8 +14,9 @@ import numpy.typing as npt
 from detent.outputs.figures import style
 from detent.ramps.differences import PAPER
 from detent.ramps.rate_generator import CLOCK_HZ
-from detent.ramps.short_movements import PAPER_HYPERBOLA, Ramp, Way, family, movement, profiles, shortest
+from detent.ramps.short_movements import PAPER_HYPERBOLA, Ramp, family, movement, profiles, shortest
 from detent.ramps.table_movement import Movement, ramped
+from detent.ramps.ways import Way
 
 PICTURES: Final = Path(__file__).parent / "pictures"
 ENTRIES: Final = len(PAPER.differences)

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from detent.ramps.curves import linear
 from detent.ramps.differences import PAPER, Differences, compiled
-from detent.ramps.short_movements import PAPER_HYPERBOLA, Ramp, Way, choose, cuts, family, hyperbola, movement, shortest
+from detent.ramps.short_movements import PAPER_HYPERBOLA, Ramp, choose, cuts, family, hyperbola, movement, shortest
 from detent.ramps.table_movement import constant, ramped
+from detent.ramps.ways import Way
 
 ENTRIES = 232
 OTHER = compiled(linear(1000, 8000, 0.2), 0.2)

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from tests.ramps import clockwork
 
 from detent.ramps.differences import PAPER
-from detent.ramps.short_movements import Way, movement
+from detent.ramps.short_movements import movement
 from detent.ramps.table_movement import Movement, braked, constant, ramped
+from detent.ramps.ways import Way
 
 LOW = 3077  # clocks of the low speed
 ALL_ENTRIES = 232

@@ -34,7 +34,7 @@ from detent.controllers.supersigma.phrases import Phrases as SupersigmaPhrases
 from detent.controllers.supersigma.program import LEAST_OFFSET
 from detent.pins import Level, Pin
 from detent.ramps import differences
-from detent.ramps.short_movements import Way
+from detent.ramps.ways import Way
 from detent.ticks import US, parse_duration
 
 CURRENT_STRAPS = frozenset({*genstepper_pins.HALF_JUMPERS, "FUL", "R1K"})

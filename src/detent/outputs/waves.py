@@ -50,7 +50,9 @@ class Wave(NamedTuple):
         return self if changes.all() else self.where(changes)
 
 
-def wave(times: Sequence[Ns] | Int64Array, levels: Sequence[int] | Levels, order: Sequence[int] | Int64Array) -> Wave:
+def wave(
+    times: "Sequence[Ns] | Int64Array", levels: Sequence[int] | Levels, order: "Sequence[int] | Int64Array"
+) -> Wave:
     """A wave from columns that are in order already."""
     return Wave(np.asarray(times, np.int64), np.asarray(levels, np.uint8), np.asarray(order, np.int64))
 

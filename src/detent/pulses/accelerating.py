@@ -10,8 +10,7 @@ from fractions import Fraction
 from functools import lru_cache
 from math import floor, isqrt, sqrt
 
-from detent.pulses import arrays
-from detent.pulses.segment import Immutable, Int64Array, check_range
+from detent.pulses.segment import GUARD, Immutable, check_range
 from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, SECOND, Fixed, Ns
 
 FIXED_PER_S: Fixed = SECOND * ONE_NS
@@ -96,7 +95,7 @@ class Accelerating(Immutable):
         away = square / (sqrt(square + self.square_ns) + slow)
         estimate = (base & BELOW_NS) * NS_PER_FIXED + (away if up else -away)
         whole = floor(estimate)
-        guard = arrays.GUARD * (away + 2.0)
+        guard = GUARD * (away + 2.0)
         if guard < estimate - whole < 1.0 - guard:
             return (base >> FIXED_BITS) + whole
         return (start + self.fixed(n) + HALF_NS) >> FIXED_BITS
@@ -110,7 +109,7 @@ class Accelerating(Immutable):
             return 0 if self.up else self._count_before(limit)
         x = away * (away + 2.0 * self.slow_ns) / self.gain_ns
         whole = int(x)
-        guard = arrays.GUARD * (x + 1.0)
+        guard = GUARD * (x + 1.0)
         if not guard < x - whole < 1.0 - guard:
             return self._count_before(limit)
         if self.up:
@@ -149,10 +148,6 @@ class Accelerating(Immutable):
     def moved(self, by: Fixed) -> "Accelerating":
         """The same segment, `by` later."""
         return replace(self, anchor=self.anchor + by)
-
-    def fill(self, out: Int64Array, first: int, start: Fixed) -> None:
-        """Write the ns of the pulses first .. first + len(out) - 1."""
-        arrays.fill_ramp(out, first, self, start)
 
 
 _DERIVED = ("root_gain", "slow_root", "divisor", "gain_ns", "slow_ns", "square_ns")

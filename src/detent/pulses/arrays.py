@@ -10,25 +10,21 @@ Two ways to run the inner loop of long ramps give the same integers: NumPy, and 
 from collections.abc import Callable
 from importlib import import_module
 from math import sqrt
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from detent.extras import installed, need
-from detent.pulses.segment import Int64Array
+from detent.pulses.accelerating import Accelerating
+from detent.pulses.segment import GUARD, Int64Array
 from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, Fixed, Ns
-
-if TYPE_CHECKING:
-    from detent.pulses.accelerating import Accelerating
 
 CHUNK = 1 << 14  # pulses whose work arrays stay in the cache
 DENSE_CHUNK = 1 << 17  # pulses a call of the numba loop is worth
 DENSE_FROM = 2_000_000  # pulses for which importing numba (a second or so) pays
 FEW = 8  # pulses for which the exact law is quicker than arrays
 
-# Estimates are good to 8 rounding errors of 2**-53; the guard is twice that.
-GUARD = 2.0**-49
 FAR = 2.0**37  # ns from the base at which one in 2000 comes too close: a shorter chunk is quicker
 SHORTEST = 256  # pulses of such a chunk, unless they take so long that none is safe
 TOO_FAR = 2.0**46
@@ -82,7 +78,7 @@ def settle(out: Int64Array, estimate: npt.NDArray[np.float64], guard: float, bas
             out[i] = exact(i)
 
 
-def fill_ramp(out: Int64Array, first: int, law: "Accelerating", start: Fixed) -> None:
+def fill_ramp(out: Int64Array, first: int, law: Accelerating, start: Fixed) -> None:
     """Write the ns of the pulses first .. of a ramp in a train that starts at `start`."""
     scale = (law.divisor * ONE_NS) ** 2  # (P x + Q**2) / scale is the square of the ns from standstill
     gain = law.gain_ns

@@ -11,21 +11,19 @@ Tables and ticked segments answer for themselves.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from detent.pulses import table_arrays, ticked_arrays
 from detent.pulses.accelerating import Accelerating
-from detent.pulses.arrays import GUARD, split
-from detent.pulses.segment import Int64Array
+from detent.pulses.arrays import split
+from detent.pulses.laws import AnySegment
+from detent.pulses.segment import GUARD, Int64Array
 from detent.pulses.table import Table
 from detent.pulses.ticked import Ticked
 from detent.pulses.uniform import Uniform
 from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, Fixed, Ns
-
-if TYPE_CHECKING:
-    from detent.pulses.shape import AnySegment
 
 BLOCK = 1 << 14  # questions at a time
 SORT_FROM = 1 << 12  # segments from which it pays to look queries up in order
@@ -38,7 +36,7 @@ class Columns:
     """The segments of a shape, one entry each, for a train that starts `rest` after ns 0."""
 
     def __init__(
-        self, segments: Sequence["AnySegment"], before: list[int], through: list[int], lasts: list[Fixed], rest: Fixed
+        self, segments: Sequence[AnySegment], before: list[int], through: list[int], lasts: list[Fixed], rest: Fixed
     ) -> None:
         self._segments, self._rest = segments, rest
         self._before, self._through = _integers(before), _integers(through)
@@ -160,23 +158,27 @@ class Columns:
             result[at] = one(self._segments[segment[at]], [int(asked[at])], self._rest)[0]
 
 
-def _exact_times(segment: "AnySegment", n: list[int], rest: Fixed) -> list[int]:
+def _exact_times(segment: AnySegment, n: list[int], rest: Fixed) -> list[int]:
     return [(rest + segment.fixed(k) + HALF_NS) >> FIXED_BITS for k in n]
 
 
-def _exact_counts(segment: "AnySegment", t: list[int], rest: Fixed) -> list[int]:
+def _exact_counts(segment: AnySegment, t: list[int], rest: Fixed) -> list[int]:
     return [segment.count_before((k << FIXED_BITS) + HALF_NS - rest) for k in t]
 
 
 def _batch_times(segment: Table | Ticked, n: Int64Array, rest: Fixed) -> Int64Array:
-    return segment.times_of(n, rest)
+    if isinstance(segment, Table):
+        return table_arrays.times_of(segment, n, rest)
+    return ticked_arrays.times_of(segment, n, rest)
 
 
 def _batch_counts(segment: Table | Ticked, t: Int64Array, rest: Fixed) -> Int64Array:
-    return segment.counts_by(t, rest)
+    if isinstance(segment, Table):
+        return table_arrays.counts_by(segment, t, rest)
+    return ticked_arrays.counts_by(segment, t, rest)
 
 
-def _law(of: "AnySegment", rest: Fixed) -> tuple[tuple[int, ...], tuple[float, ...]]:
+def _law(of: AnySegment, rest: Fixed) -> tuple[tuple[int, ...], tuple[float, ...]]:
     """(base, whole, sign, x0), (slow, gain, gain2, lead, square, linear); `lead` is rest + 1/2 ns after `base`."""
     if isinstance(of, Uniform):
         base, part = split(of.fixed(0) + rest)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from detent.pulses import ticked_arrays
 from detent.pulses.segment import Int64Array
 from detent.pulses.ticked import Ticked
 from detent.pulses.train import Train
@@ -18,7 +19,7 @@ def rates_at(train: Train, times: Int64Array) -> Int64Array:
         if not len(inside):
             continue
         if isinstance(segment, Ticked):
-            rates[low:high] = segment.rates_by(inside, train.start)
+            rates[low:high] = ticked_arrays.rates_by(segment, inside, train.start)
         else:
             found = (int(segment.progress(to_fixed(t) - train.start)[1]) for t in inside.tolist())
             rates[low:high] = np.fromiter(found, np.int64, len(inside))

@@ -6,14 +6,18 @@ gives the nanosecond that rounding the true time half up would, ties included, b
 nanoseconds are whole numbers of `Fixed`.
 """
 
-from typing import Any, NamedTuple, Protocol, Self, TypeAlias
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeAlias
 
 from detent.ticks import Fixed, Ns
 
-Int64Array: TypeAlias = npt.NDArray[np.int64]
+if TYPE_CHECKING:  # loading NumPy takes longer than most of what is asked pulse by pulse
+    import numpy as np
+    import numpy.typing as npt
+
+Int64Array: TypeAlias = "npt.NDArray[np.int64]"
+
+# Estimates by float64 are good to 8 rounding errors of 2**-53; the guard is twice that.
+GUARD = 2.0**-49
 
 
 class State(NamedTuple):
@@ -40,7 +44,10 @@ class Immutable:
 
 
 class Segment(Protocol):
-    """The contract of the four laws. Pulses are numbered 1..steps within the segment; 0 is its beginning."""
+    """The contract of the four laws. Pulses are numbered 1..steps within the segment; 0 is its beginning.
+
+    A segment answers pulse by pulse; `filling` and `batch` ask many of it at once.
+    """
 
     @property
     def steps(self) -> int | None:
@@ -71,12 +78,6 @@ class Segment(Protocol):
 
     def moved(self, by: Fixed) -> Self:
         """The same segment, `by` later in its train."""
-
-    def fill(self, out: Int64Array, first: int, start: Fixed) -> None:
-        """Write the ns of the pulses first .. first + len(out) - 1 of a train that starts at `start`.
-
-        The caller has made sure that they exist and fit int64.
-        """
 
 
 def check_range(first: int, last: int | None, steps: int | None) -> None:

@@ -1,19 +1,15 @@
 """What trains that differ only in their start share: segments, running sums, and arrays kept for next time."""
 
 from bisect import bisect_left
-from typing import TypeAlias
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from detent.pulses.accelerating import Accelerating
-from detent.pulses.batch import Columns
+from detent.pulses.laws import AnySegment
 from detent.pulses.segment import Int64Array
-from detent.pulses.table import Table
 from detent.pulses.ticked import Ticked
-from detent.pulses.uniform import Uniform
 from detent.ticks import FIXED_BITS, ONE_NS, Fixed
 
-AnySegment: TypeAlias = Uniform | Accelerating | Table | Ticked
+if TYPE_CHECKING:
+    from detent.pulses.batch import Columns
 
 SMALL = 1 << 13  # pulses of a shape whose times are kept
 SHORT = 1 << 10  # pulses a segment, on average, below which columns are quicker than segment after segment
@@ -56,9 +52,11 @@ class Shape:
             self.lasts.append(last)
             self.ends.append(end)
 
-    def columns(self, rest: Fixed) -> Columns:
+    def columns(self, rest: Fixed) -> "Columns":
         """The segments as columns, for a start `rest` after a whole ns; the last ones asked for are kept."""
         if self._columns is None or self._columns[0] != rest:
+            from detent.pulses.batch import Columns
+
             self._columns = rest, Columns(self.segments, self.before, self.through, self.lasts, rest)
         return self._columns[1]
 
@@ -67,6 +65,8 @@ class Shape:
 
         A small shape keeps all its times: the same ramps come again and again.
         """
+        import numpy as np
+
         if self.steps is None or self.steps > SMALL:
             self._fill(out, first, start)
             return
@@ -78,6 +78,8 @@ class Shape:
         np.add(self._kept[1][first - 1 : first - 1 + len(out)], whole, out=out)
 
     def _fill(self, out: Int64Array, first: int, start: Fixed) -> None:
+        from detent.pulses.filling import fill
+
         last = first + len(out) - 1
         i, stop = bisect_left(self.through, first), bisect_left(self.through, last)
         if stop - i > 8 and len(out) < SHORT * (stop - i):
@@ -89,6 +91,6 @@ class Shape:
             through = self.through[i] if i < len(self.through) else last
             count = min(last, through) - n + 1
             if count > 0:
-                self.segments[i].fill(out[done : done + count], n - self.before[i], start)
+                fill(out[done : done + count], self.segments[i], n - self.before[i], start)
                 done += count
             i += 1

@@ -3,67 +3,15 @@
 from bisect import bisect_left
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-
-from detent.pulses import arrays
-from detent.pulses.segment import Immutable, Int64Array, check_range
+from detent.pulses.segment import Immutable, check_range
 from detent.ticks import FIXED_BITS, HALF_NS, SECOND, Fixed, Ns
 
-LIMIT = 1 << 62
+if TYPE_CHECKING:
+    import numpy.typing as npt
 
-
-class Rows(Immutable):
-    """The columns of a table with their running sums: read-only int64 arrays of one length, shared by parts.
-
-    `counts` and `periods` are whole numbers of at least 1. ValueError for others, and for columns of different
-    lengths; OverflowError for a table of 2**62 ticks or more. Rows are equal if their columns are.
-    """
-
-    __slots__ = ("counts", "periods", "pulses", "pulses_list", "ticks", "ticks_list")
-
-    def __init__(self, counts: npt.ArrayLike, periods: npt.ArrayLike) -> None:
-        self.counts, self.periods = _column(counts, "counts"), _column(periods, "periods")
-        if self.counts.shape != self.periods.shape:
-            raise ValueError(f"a table has as many counts as periods, not {len(self.counts)} and {len(self.periods)}")
-        if float(np.dot(self.counts.astype(np.float64), self.periods.astype(np.float64))) >= LIMIT:
-            raise OverflowError("the table takes more than 2**62 ticks: split it")
-        # before row i: pulses[i] pulses, ticks[i] ticks; one more entry for the end
-        self.pulses, self.ticks = _sums(self.counts), _sums(self.counts * self.periods)
-        # bisect wants plain integers; a memoryview gives them without a second copy
-        self.pulses_list, self.ticks_list = self.pulses.data, self.ticks.data
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Rows):
-            return NotImplemented
-        return np.array_equal(self.counts, other.counts) and np.array_equal(self.periods, other.periods)
-
-    def __hash__(self) -> int:
-        return hash((len(self.counts), self.pulses_list[-1], self.ticks_list[-1]))
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return Rows, (self.counts, self.periods)
-
-
-def _column(values: npt.ArrayLike, name: str) -> Int64Array:
-    column = np.array(values)
-    if column.size == 0:
-        column = column.astype(np.int64)
-    if column.ndim != 1 or column.dtype.kind not in "iu":
-        raise ValueError(f"the {name} of a table are a column of integers, not {column.dtype} of shape {column.shape}")
-    if column.size and (int(column.min()) < 1 or int(column.max()) >= LIMIT):
-        raise ValueError(f"the {name} of a table are at least 1 and less than 2**62")
-    result: Int64Array = column.astype(np.int64)
-    result.flags.writeable = False
-    return result
-
-
-def _sums(column: Int64Array) -> Int64Array:
-    sums = np.zeros(len(column) + 1, np.int64)
-    np.cumsum(column, out=sums[1:])
-    sums.flags.writeable = False
-    return sums
+    from detent.pulses.rows import Rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +23,7 @@ class Table(Immutable):
 
     anchor: Fixed
     tick: Fraction | int
-    rows: Rows
+    rows: "Rows"
     first: int = 0
     last: int = field(default=-1)
 
@@ -88,8 +36,10 @@ class Table(Immutable):
         check_range(self.first, self.last, total)
 
     @classmethod
-    def of(cls, anchor: Fixed, tick: Fraction | int, counts: npt.ArrayLike, periods: npt.ArrayLike) -> "Table":
-        """The table with these columns (sequences or integer arrays; see :class:`Rows`)."""
+    def of(cls, anchor: Fixed, tick: Fraction | int, counts: "npt.ArrayLike", periods: "npt.ArrayLike") -> "Table":
+        """The table with these columns (sequences or integer arrays; see :class:`~detent.pulses.rows.Rows`)."""
+        from detent.pulses.rows import Rows
+
         return cls(anchor, tick, Rows(counts, periods))
 
     @property
@@ -158,47 +108,3 @@ class Table(Immutable):
     def moved(self, by: Fixed) -> "Table":
         """The same segment, `by` later."""
         return replace(self, anchor=self.anchor + by)
-
-    def fill(self, out: Int64Array, first: int, start: Fixed) -> None:
-        """Write the ns of the pulses first .. first + len(out) - 1."""
-        rows, anchor, done, i = self.rows, start + self.anchor, 0, self.first + first
-        row = bisect_left(rows.pulses_list, i) - 1
-        while done < len(out):
-            stop = min(row + arrays.CHUNK // 8, len(rows.counts))
-            block = min(len(out) - done, arrays.CHUNK, int(rows.pulses_list[stop]) - i + 1)
-            self._fill_block(out[done : done + block], i, row, anchor)
-            done, i = done + block, i + block
-            row = bisect_left(rows.pulses_list, i) - 1
-
-    def _fill_block(self, out: Int64Array, i: int, row: int, anchor: Fixed) -> None:
-        """Write the ns of the pulses i .. i + len(out) - 1 of the whole table; `row` has pulse i."""
-        rows, last = self.rows, i + len(out) - 1
-        stop = bisect_left(rows.pulses_list, last)
-        base = int(rows.ticks_list[row]) + (i - 1 - rows.pulses_list[row]) * int(rows.periods[row])
-        counts = rows.counts[row:stop].copy()
-        counts[0] = rows.pulses_list[row + 1] - i + 1
-        counts[-1] -= rows.pulses_list[stop] - last
-        ticks = np.repeat(rows.periods[row:stop], counts)
-        np.cumsum(ticks, out=ticks)
-        arrays.put_ticks(out, ticks, base, self.tick.numerator, self.tick.denominator, anchor)
-
-    def times_of(self, n: Int64Array, start: Fixed) -> Int64Array:
-        """The ns of the pulses `n` (1..steps each, any order)."""
-        rows, i = self.rows, n + self.first
-        row = np.searchsorted(rows.pulses, i) - 1
-        ticks = (i - rows.pulses[row]) * rows.periods[row] + rows.ticks[row]
-        out = np.empty(len(n), np.int64)
-        arrays.put_ticks(out, ticks, 0, self.tick.numerator, self.tick.denominator, start + self.anchor)
-        return out
-
-    def counts_by(self, t: Int64Array, start: Fixed) -> Int64Array:
-        """How many pulses have their ns at or before each of `t` (any order)."""
-        rows = self.rows
-        ticks = arrays.ticks_by(t, self.tick.numerator, self.tick.denominator, start + self.anchor)
-        np.clip(ticks, 0, rows.ticks_list[-1], out=ticks)
-        if not len(rows.counts):
-            return np.zeros(len(t), np.int64)
-        row = np.minimum(np.searchsorted(rows.ticks, ticks, side="right"), len(rows.counts)) - 1
-        i = (ticks - rows.ticks[row]) // rows.periods[row] + rows.pulses[row]
-        result: Int64Array = np.clip(i, self.first, self.last) - self.first
-        return result

@@ -9,10 +9,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import isqrt
 
-import numpy as np
-
-from detent.pulses import arrays
-from detent.pulses.segment import Immutable, Int64Array, check_range
+from detent.pulses.segment import Immutable, check_range
 from detent.ticks import FIXED_BITS, HALF_NS, SECOND, Fixed, Ns
 
 
@@ -120,72 +117,3 @@ class Ticked(Immutable):
     def moved(self, by: Fixed) -> "Ticked":
         """The same segment, `by` later."""
         return replace(self, anchor=self.anchor + by)
-
-    def fill(self, out: Int64Array, first: int, start: Fixed) -> None:
-        """Write the ns of the pulses first .. first + len(out) - 1."""
-        done, i = 0, self.first + first
-        while done < len(out):
-            block = min(len(out) - done, arrays.CHUNK)
-            out[done : done + block] = self._times(np.arange(i, i + block, dtype=np.int64), start)
-            done, i = done + block, i + block
-
-    def times_of(self, n: Int64Array, start: Fixed) -> Int64Array:
-        """The ns of the pulses `n` (1..steps each, any order)."""
-        return self._times(n + self.first, start)
-
-    def _times(self, i: Int64Array, start: Fixed) -> Int64Array:
-        """The ns of the pulses `i` of the whole law."""
-        out = np.empty(len(i), np.int64)
-        arrays.put_ticks(out, self._ticks_of(i), 0, self.tick.numerator, self.tick.denominator, start + self.anchor)
-        return out
-
-    def _ticks_of(self, i: Int64Array) -> Int64Array:
-        """`tick_of` for many: a float64 guess, proved in integers and stepped or looked up where it is wrong."""
-        if not self._fits():
-            return np.fromiter((self.tick_of(n) for n in i.tolist()), np.int64, len(i))
-        wanted = i * float(self.unit) - self.phase
-        slope = float(2 * self.speed + self.change)
-        root = np.sqrt(np.maximum(slope * slope + (8.0 * self.change) * wanted, 0.0))
-        k: Int64Array = np.ceil(4.0 * wanted / (slope + root)).astype(np.int64)
-        over = self._excess(k, i)  # 0 <= over < speed on tick k, for the right k
-        k += over < 0
-        k -= over >= self.speed + self.change * k
-        over = self._excess(k, i)
-        for at in np.flatnonzero((over < 0) | (over >= self.speed + self.change * k)):
-            k[at] = self.tick_of(int(i[at]))
-        return k
-
-    def counts_by(self, t: Int64Array, start: Fixed) -> Int64Array:
-        """How many pulses have their ns at or before each of `t` (any order)."""
-        k = arrays.ticks_by(t, self.tick.numerator, self.tick.denominator, start + self.anchor)
-        np.clip(k, 0, self.ticks, out=k)
-        if self._fits():
-            x = k.astype(np.float64)
-            i = ((self.phase + x * self.speed + (0.5 * self.change) * x * (x + 1.0)) / self.unit).astype(np.int64)
-            i += self._excess(k, i) // self.unit
-        else:
-            i = np.fromiter((self.position(n) // self.unit for n in k.tolist()), np.int64, len(k))
-        last = self.total if self.last is None else self.last
-        result: Int64Array = np.clip(i, self.first, last) - self.first
-        return result
-
-    def rates_by(self, t: Int64Array, start: Fixed) -> Int64Array:
-        """The whole steps/s after the last tick that has its ns at or before each of `t` (any order)."""
-        k = arrays.ticks_by(t, self.tick.numerator, self.tick.denominator, start + self.anchor)
-        np.clip(k, 0, self.ticks, out=k)
-        scale = Fraction(SECOND, self.unit) / self.tick
-        speeds = self.speed + self.change * k
-        if self.unit * scale.numerator < 1 << 62:
-            rates: Int64Array = speeds * scale.numerator // scale.denominator
-            return rates
-        return np.array([speed * scale.numerator // scale.denominator for speed in speeds.tolist()], np.int64)
-
-    def _fits(self) -> bool:
-        """Whether `_excess` is exact: guesses are good to 2**-22 of the ticks, and differences stay small."""
-        return self.unit * ((self.ticks >> 22) + 4) < 1 << 61
-
-    def _excess(self, k: Int64Array, i: Int64Array) -> Int64Array:
-        """The accumulator after k ticks less i units, modulo 2**64: right when it is small, as it is near i."""
-        triangle = ((k + 1) >> 1) * (k | 1)  # k (k + 1) / 2
-        excess: Int64Array = k * self.speed + self.phase + triangle * self.change - i * self.unit
-        return excess

@@ -4,10 +4,9 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-import numpy as np
-
+from detent.pulses.laws import AnySegment
 from detent.pulses.segment import Immutable, Int64Array, State
-from detent.pulses.shape import AnySegment, Shape
+from detent.pulses.shape import Shape
 from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, Fixed, Ns, to_fixed
 
 INT64 = range(-(1 << 63), 1 << 63)
@@ -164,12 +163,14 @@ class Train(Immutable):
             del moved[0]
         return Train(moved, start)
 
-    def times(self, first: int = 1, last: int | None = None, out: Int64Array | None = None) -> Int64Array:
+    def times(self, first: int = 1, last: int | None = None, out: "Int64Array | None" = None) -> Int64Array:
         """The ns of the pulses first .. last (None: the last one) as int64, in `out` if given, else a new array.
 
         `out` is an int64 array of just that length. IndexError outside 1..steps, ValueError for an open-ended
         train without `last` and for a wrong `out`, OverflowError beyond int64.
         """
+        import numpy as np
+
         last = self._last(last)
         if first < 1:
             raise self._no_pulse(first)
@@ -186,6 +187,8 @@ class Train(Immutable):
 
     def chunks(self, size: int = 1 << 16, first: int = 1, last: int | None = None) -> Iterator[Int64Array]:
         """The same as `times`, `size` pulses at a time. Each array is valid until the next is asked for."""
+        import numpy as np
+
         if size < 1:
             raise ValueError(f"a chunk has at least one pulse, not {size}")
         last = self._last(last)
@@ -197,6 +200,8 @@ class Train(Immutable):
 
     def times_of(self, n: Int64Array) -> Int64Array:
         """`time_of` for an integer array of any shape. IndexError outside 0..steps."""
+        import numpy as np
+
         n = np.asarray(n)
         if n.dtype.kind not in "iu":
             raise TypeError(f"pulses have whole numbers, not {n.dtype}")
@@ -214,6 +219,8 @@ class Train(Immutable):
 
     def counts_by(self, t: Int64Array) -> Int64Array:
         """`steps_by` for an integer array of any shape."""
+        import numpy as np
+
         t = np.asarray(t)
         if t.dtype.kind not in "iu":
             raise TypeError(f"times are whole ns, not {t.dtype}")

@@ -3,8 +3,7 @@
 from dataclasses import dataclass, replace
 from math import gcd
 
-from detent.pulses import arrays
-from detent.pulses.segment import Immutable, Int64Array, check_range
+from detent.pulses.segment import Immutable, check_range
 from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, Fixed, Ns
 
 NS_PER_S = 1_000_000_000
@@ -87,7 +86,3 @@ class Uniform(Immutable):
     def moved(self, by: Fixed) -> "Uniform":
         """The same segment, `by` later."""
         return replace(self, anchor=self.anchor + by)
-
-    def fill(self, out: Int64Array, first: int, start: Fixed) -> None:
-        """Write the ns of the pulses first .. first + len(out) - 1."""
-        arrays.fill_progression(out, self.first + first, self.numerator, self.denominator, start + self.anchor)

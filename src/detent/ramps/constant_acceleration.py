@@ -6,7 +6,7 @@ from math import isqrt
 from typing import NamedTuple
 
 from detent.pulses import Accelerating, Train, Uniform
-from detent.pulses.shape import AnySegment
+from detent.pulses.laws import AnySegment
 from detent.ticks import ONE_NS, SECOND, Fixed
 
 ONE_SECOND: Fixed = SECOND * ONE_NS

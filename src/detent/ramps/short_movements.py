@@ -9,7 +9,6 @@ before it comes to an end".
 """
 
 from collections.abc import Sequence
-from enum import Enum
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -19,19 +18,10 @@ import numpy.typing as npt
 from detent.pulses.segment import Int64Array
 from detent.ramps.differences import LARGEST_N, PAPER, Differences
 from detent.ramps.table_movement import Movement, constant, ramped
+from detent.ramps.ways import Way
 
 NEVER = int(np.iinfo(np.int64).max)  # a movement that is not to be had
-
-
 COARSE = 64  # first N's between two that are tried for the end of a family
-
-
-class Way(Enum):
-    """How the ramps of a short movement are chosen."""
-
-    HYPERBOLA = "hyperbola"
-    EXACT = "exact"
-    FREE = "free"
 
 
 class Ramp(NamedTuple):
@@ -102,7 +92,7 @@ class _Generators:
     def __init__(self, n: Int64Array) -> None:
         self.loaded, self.at, self.pulses = n.copy(), np.zeros_like(n), np.zeros_like(n)
 
-    def load(self, clock: Int64Array | int, n: Int64Array, chosen: npt.NDArray[np.bool_]) -> None:
+    def load(self, clock: "Int64Array | int", n: Int64Array, chosen: npt.NDArray[np.bool_]) -> None:
         """At `clock` load `n` into the chosen ones."""
         period = self.loaded + 1
         runs = np.where(chosen & (self.at <= clock), (clock - self.at) // period + 1, 0)

@@ -8,12 +8,14 @@ v(i) = 1095.4 sqrt(i), i = 1, 2, ...; a ramp makes K steps at the initial speed 
 from bisect import bisect_left, bisect_right
 from functools import lru_cache
 from math import isqrt
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from detent.pulses import Table, Train, Uniform
-from detent.pulses.shape import AnySegment
-from detent.pulses.table import Rows
+from detent.pulses.laws import AnySegment
 from detent.ticks import FIXED_BITS, SECOND, Fixed, Ns
+
+if TYPE_CHECKING:
+    from detent.pulses.rows import Rows
 
 TICK: Final[Ns] = 8_036
 LEAST_COUNT: Final = 3  # 41 480 steps/s, the "42,000 SPS ceiling" (page 65)
@@ -81,8 +83,10 @@ def ladder(initial: int, divide: int) -> Ladder:
 
 
 @lru_cache(maxsize=256)
-def _rows(initial: int, divide: int, each: int, rising: bool) -> Rows:
+def _rows(initial: int, divide: int, each: int, rising: bool) -> "Rows":
     """The whole ladder as a table with `each` steps (1 or more) on every rung, from slow to fast if `rising`."""
+    from detent.pulses.rows import Rows  # brings NumPy
+
     periods = ladder(initial, divide).periods
     merged: list[list[int]] = []
     for period in periods if rising else reversed(periods):
@@ -110,7 +114,7 @@ def _descend(at: Fixed, speeds: Speeds, low: int, high: int) -> list[AnySegment]
     return [_part(at, rows, speeds.down * (rungs - high), speeds.down * (rungs - low))]
 
 
-def _part(at: Fixed, rows: Rows, first: int, last: int) -> Table:
+def _part(at: Fixed, rows: "Rows", first: int, last: int) -> Table:
     whole = Table(0, TICK, rows, first, last)
     return whole.moved(at - whole.begin)
 

@@ -18,7 +18,7 @@ from detent.motors.rotor import Floats
 from detent.moves.law import Law
 from detent.moves.supersigma import of_program
 from detent.ramps.differences import INTERVAL, CurveError, Differences, compiled
-from detent.ramps.short_movements import Way
+from detent.ramps.ways import Way
 from detent.tuner.quasi_static import Torque
 
 FASTEST = supersigma.LARGEST_SPEED * supersigma.SPEED_UNIT  # half steps/s

@@ -14,9 +14,9 @@ import numpy.typing as npt
 from detent.cell.course import SAMPLE
 from detent.cell.recording import Span
 from detent.pulses import Train
+from detent.pulses.laws import AnySegment
 from detent.pulses.rates import rates_at
 from detent.pulses.segment import Int64Array
-from detent.pulses.shape import AnySegment
 from detent.ticks import FIXED_BITS, Ns
 from detent.workbench import rotors
 from detent.workbench.columns import Rows

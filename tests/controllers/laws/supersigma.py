@@ -9,7 +9,7 @@ from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, 
 
 from detent.controllers.supersigma.firmware import Supersigma
 from detent.pins import HIGH, LOW
-from detent.ramps.short_movements import Way
+from detent.ramps.ways import Way
 from detent.ticks import MS, US, Ns
 
 TABLE: Ns = 232 * 1290 * US  # "once every 1.29 ms" ("Long movements"): all of the table

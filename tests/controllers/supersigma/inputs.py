@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from tests.controllers.conformance import Candidate
 
 from detent.controllers.supersigma.firmware import Supersigma
-from detent.ramps.short_movements import Way
+from detent.ramps.ways import Way
 from detent.ticks import MS, US, Ns
 from detent.uart import Char
 

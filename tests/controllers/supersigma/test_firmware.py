@@ -14,7 +14,8 @@ from detent.controllers.supersigma.firmware import Supersigma
 from detent.controllers.supersigma.link import answers
 from detent.pins import PinSet
 from detent.ramps.differences import PAPER
-from detent.ramps.short_movements import Way, movement
+from detent.ramps.short_movements import movement
+from detent.ramps.ways import Way
 from detent.ticks import MS, SECOND, Ns
 from detent.uart import Char, Sent
 

@@ -6,10 +6,9 @@ WA1 at 0, WB1 a full step later, then WA2, WB2; between them, in microsteps, the
 """
 
 from collections.abc import Sequence
+from functools import cache
 from math import cos, pi
 from typing import NamedTuple
-
-import numpy as np
 
 from detent.controllers.device import Stage
 from detent.pulses.segment import Int64Array
@@ -77,7 +76,14 @@ _TABLES = (
     tuple(_row(rotor // STEP * 2 + 1) for rotor in range(CYCLE)),
     tuple(_micro(rotor) for rotor in range(CYCLE)),
 )
-_ARRAYS = tuple(np.array(rows, np.int64) for rows in _TABLES)
+
+
+@cache
+def _arrays() -> tuple[Int64Array, ...]:
+    """The tables as arrays, a row a place."""
+    import numpy as np
+
+    return tuple(np.array(rows, np.int64) for rows in _TABLES)
 
 
 class Drive(NamedTuple):
@@ -126,10 +132,11 @@ class Drive(NamedTuple):
     def duties_at(self, positions: Int64Array, rates: Int64Array) -> Int64Array:
         """`duties` for many positions and rates: a row each."""
         places = positions * self.size % CYCLE
-        counts: Int64Array = _ARRAYS[self.mode][places] * self.sixteenths // 16
+        tables = _arrays()
+        counts: Int64Array = tables[self.mode][places] * self.sixteenths // 16
         if self.auto >= 0:
             fast = rates // 256 > self.auto
-            counts[fast] = _ARRAYS[self.auto_mode][places[fast]]
+            counts[fast] = tables[self.auto_mode][places[fast]]
         return counts
 
     def step_mode(self, rate: int) -> int:

@@ -19,7 +19,7 @@ from detent.controllers.supersigma.program import BRAKING, OFFSET, Program
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind, PulseOutput
 from detent.ramps.differences import PAPER, Differences
 from detent.ramps.rate_generator import CLOCK_HZ
-from detent.ramps.short_movements import Way
+from detent.ramps.ways import Way
 from detent.ticks import NEVER, Ns, show_duration
 from detent.uart import Char, Format, Sent, SerialPort, Transmitter
 

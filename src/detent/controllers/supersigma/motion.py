@@ -9,7 +9,6 @@ from detent.controllers.supersigma.program import Program
 from detent.pins import HIGH, LOW, Level, PinDriver
 from detent.ramps.differences import nearest_count
 from detent.ramps.rate_generator import CLOCK_NS
-from detent.ramps.short_movements import movement
 from detent.ramps.table_movement import Movement, braked, constant
 from detent.ticks import NEVER, Ns, to_fixed
 
@@ -155,6 +154,8 @@ class Motion:
             self._plan()
 
     def _ramped(self, steps: int, direction: int, entries: int, now: Ns) -> None:
+        from detent.ramps.short_movements import movement  # brings NumPy
+
         table, offset, way, _ = self._program
         self._begin(Course.MOVE, movement(table, steps, offset, way, entries), direction, now)
 

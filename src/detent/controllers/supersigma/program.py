@@ -7,7 +7,7 @@ program's other sections (the paper's table 2) and 254 differences.
 from typing import NamedTuple
 
 from detent.ramps.differences import PAPER, Differences
-from detent.ramps.short_movements import Way
+from detent.ramps.ways import Way
 
 OFFSET = 10  # "a small number (typically 10)"
 LEAST_OFFSET = 4  # with fewer the pulses of a long movement would end before the table
