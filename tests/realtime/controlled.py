@@ -41,10 +41,22 @@ def slide() -> Description:
     return parse(SLIDE, "slide.toml")
 
 
+def looping() -> Description:
+    """A unit with a program that goes on for ever: something happens every few milliseconds."""
+    return parse('[units.slide]\nmodel = "gs-c200s"\nprogram = "again.gsc"\nstraps = { CHS = "low" }\n', "again.toml")
+
+
+def again(name: str) -> str:
+    """The files of `looping`; of the other cells there is none."""
+    if name != "again.gsc":
+        raise FileNotFoundError(name)
+    return "again: W1\nj again\n"
+
+
 @contextmanager
 def controlled(description: Description, *, free: bool = True) -> Iterator[Control]:
     """The control of a cell that is served, as fast as it goes unless it shall keep pace."""
-    with Service(description, no_file, observed=True) as service:
+    with Service(description, again, observed=True) as service:
         if free:
             service.pace.change(None, service.cell.now)
         serving = threading.Thread(target=service.run)

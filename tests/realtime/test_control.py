@@ -348,3 +348,35 @@ def test_an_output_of_which_nobody_is_told_has_no_level() -> None:
     with controlled(single("bs0610")) as board:
         pins: Any = board.call("pins", {})["pins"]["bs0610"]
     assert (pins["XWA1"]["level"], pins["RDY"]["level"]) == (None, 1)
+
+
+def test_what_waits_on_a_line_has_a_bound_and_can_be_dropped(cell: Control) -> None:
+    """9600 baud, 10 bits and a stop bit: 60 000 characters would take a minute and more."""
+    cell.call("pause", {})
+    with pytest.raises(AskedWrongly, match=r"0\.0 s of characters wait on line slide, and these would be 60000 more"):
+        cell.call("send", {"line": "slide", "data": "x" * 60_000})
+    cell.call("send", {"line": "slide", "data": "x" * 30_000})
+    for verb, given in (
+        ("send", {"line": "slide", "data": "x" * 30_000}),
+        ("type", {"unit": "slide", "text": "x" * 30_000}),
+    ):
+        with pytest.raises(AskedWrongly, match=r"at most 60 s of them wait: send fewer, or drop them \(clear\)"):
+            cell.call(verb, given)
+    cell.call("step", {"time": "3 ms"})
+    cell.call("clear", {"line": "slide"})
+    cell.call("type", {"unit": "slide", "text": "V1"})
+    cell.call("step", {"time": "1 s"})
+    journal: Any = cell.call("journal", {})["journal"]
+    assert [entry["deed"] for entry in journal] == ["Send", "Discard", "Send"]
+    state: Any = cell.call("state", {})
+    assert state["lines"]["slide"]["received"] == 3 + 3, "what had begun when the rest was dropped, and V1 CR"
+
+
+def test_a_wait_in_the_midst_of_a_step_is_met_in_its_instant_and_may_end_it(cell: Control) -> None:
+    began = cell.call("pause", {})["time_ns"]
+    assert isinstance(began, int)
+    cell.call("type", {"unit": "slide", "text": "+100"})
+    reached = cell.ask("wait", {"unit": "slide", "state": "running", "pause": True})
+    told = cell.call("step", {"time": "10 s"})
+    assert told["reached"] is False
+    assert reached.result(60)["time_ns"] == told["time_ns"]

@@ -1,18 +1,22 @@
+import contextlib
 import http.client
 import json
 import socket
 import threading
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
 from typing import Any
 
 import pytest
-from tests.realtime.controlled import controlled, one
+from tests.realtime.controlled import controlled, looping, one
 
 from detent.realtime import verbs
 from detent.realtime.control import Control
 from detent.realtime.endpoints.endpoint import EndpointError
 from detent.realtime.endpoints.tcp import TcpAddress
-from detent.realtime.http import LONGEST_BODY, MOST_CLIENTS, HttpControl, is_loopback
+from detent.realtime.http import MOST_CLIENTS, MOST_WAITING, HttpControl, is_loopback
+from detent.realtime.http1 import LONGEST_BODY
+from detent.realtime.verbs import Answer
 
 ANY = TcpAddress("127.0.0.1", 0)
 TOKEN = "a secret of many letters"
@@ -261,8 +265,11 @@ def test_garbage_is_turned_away_without_a_traceback(
 class Broken:
     """A control with a fault of its own."""
 
-    def call(self, verb: str, given: Mapping[str, object]) -> dict[str, Any]:
+    def ask(self, verb: str, given: Mapping[str, object]) -> Future[Answer]:
         raise ZeroDivisionError("what should not be")
+
+    def late(self, verb: str) -> Answer:
+        raise NotImplementedError
 
     def end(self) -> None:
         pass
@@ -281,7 +288,7 @@ def test_many_clients_are_served_at_once(served: HttpControl) -> None:
     found: list[int] = []
     waiting = [
         threading.Thread(target=lambda: found.append(ask(served, "POST", "/wait", {"time": "100 s"})[0]))
-        for _ in range(MOST_CLIENTS - 4)
+        for _ in range(MOST_WAITING - 1)
     ]
     for thread in waiting:
         thread.start()
@@ -305,6 +312,141 @@ def test_whoever_waits_when_it_ends_is_told_and_idle_clients_hold_nothing_up() -
         waiting.join()
         idle.close()
     assert found == [(503, {"error": "the cell is not served any more", "remedy": "start it again: detent serve"})]
+
+
+def test_slow_clients_cost_nobody_a_place_they_leave_when_another_comes(served: HttpControl) -> None:
+    slow = [socket.create_connection(served.address[:2], timeout=60) for _ in range(MOST_CLIENTS)]
+    for one_of_them in slow:
+        one_of_them.sendall(b"POST /state HTTP/1.1\r\nHost: 127")
+    assert ask(served, "GET", "/state")[0] == 200
+    gone = []
+    for one_of_them in slow:
+        one_of_them.setblocking(False)
+        try:
+            gone.append(one_of_them.recv(1) == b"")
+        except ConnectionError:
+            gone.append(True)
+        except BlockingIOError:
+            gone.append(False)
+        one_of_them.close()
+    assert gone.index(True) == 0, "the first of them has waited for longest"
+
+
+def test_clients_that_take_no_answer_cost_nobody_a_place(served: HttpControl) -> None:
+    slow = [socket.create_connection(served.address[:2], timeout=60) for _ in range(MOST_CLIENTS + 20)]
+    for one_of_them in slow:
+        with contextlib.suppress(OSError):  # sent away already
+            one_of_them.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+    assert ask(served, "GET", "/state")[0] == 200
+    for one_of_them in slow:
+        one_of_them.close()
+
+
+def test_more_than_so_many_cannot_wait_and_those_who_leave_make_room(served: HttpControl) -> None:
+    ask(served, "POST", "/pause")
+    body = b'{"time": "100 s"}'
+    said = b"POST /wait HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)
+    waiting = [socket.create_connection(served.address[:2], timeout=60) for _ in range(MOST_WAITING)]
+    for one_of_them in waiting:
+        one_of_them.sendall(said)
+    short = {"time": "100 s", "timeout": "1 ms"}
+    while (found := ask(served, "POST", "/wait", short)[:2])[0] != 503:
+        assert found[1]["reached"] is False  # not all of them have been heard yet
+    assert found[1]["error"] == f"{MOST_WAITING} clients wait for the cell already"
+    assert ask(served, "GET", "/state")[0] == 200
+    for one_of_them in waiting:
+        one_of_them.close()
+    while ask(served, "POST", "/wait", short)[0] == 503:
+        pass  # until it is seen that they have left
+
+
+def test_others_are_answered_while_a_step_takes_long_and_a_word_about_time_ends_it() -> None:
+    with controlled(looping()) as control:
+        http = HttpControl(control, ANY)
+        ask(http, "POST", "/pause")
+        found: list[dict[str, Any]] = []
+        step = {"time": 1e6, "timeout": "1 h"}
+        stepping = threading.Thread(target=lambda: found.append(ask(http, "POST", "/step", step)[1]))
+        stepping.start()
+        began = ask(http, "GET", "/state")[1]["time_ns"]
+        while (now := ask(http, "GET", "/state")[1])["time_ns"] == began:
+            pass
+        assert now["paused"] is True
+        stands = ask(http, "POST", "/pause")[1]["time_ns"]
+        stepping.join()
+        assert (found[0]["reached"], found[0]["time_ns"]) == (False, stands)
+        assert ask(http, "POST", "/step", {"time": "1 s"})[1]["time_ns"] == stands + 1_000_000_000
+        http.close()
+
+
+def test_a_step_ends_when_the_client_who_asked_leaves() -> None:
+    with controlled(looping()) as control:
+        http = HttpControl(control, ANY)
+        ask(http, "POST", "/pause")
+        body = b'{"time": 1e6}'
+        client = socket.create_connection(http.address[:2], timeout=60)
+        client.sendall(b"POST /step HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body))
+        while control._stepping is None:
+            ask(http, "GET", "/faults")
+        client.close()
+        while not control._stepping.cancelled():
+            ask(http, "GET", "/faults")
+        stands = ask(http, "GET", "/state")[1]["time_ns"]
+        assert ask(http, "GET", "/state")[1]["time_ns"] == stands
+        http.close()
+
+
+def test_it_ends_at_once_whatever_its_clients_are_about() -> None:
+    with controlled(looping()) as control:
+        http = HttpControl(control, ANY)
+        ask(http, "POST", "/pause")
+        clients = []
+        for said in (
+            b"", b"GET /sta", b"POST /type HTTP/1.1\r\nHost: localhost\r\nContent-Length: 90\r\n\r\n{",
+            b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n",
+            b'POST /step HTTP/1.1\r\nHost: localhost\r\nContent-Length: 13\r\n\r\n{"time": 1e6}',
+            b'POST /wait HTTP/1.1\r\nHost: localhost\r\nContent-Length: 13\r\n\r\n{"time": 1e9}',
+        ):  # fmt: skip
+            client = socket.create_connection(http.address[:2], timeout=60)
+            client.sendall(said)
+            clients.append(client)
+        until_waiting(control)
+        http.close()
+        answers = []
+        for client in clients:
+            answer = b""
+            with contextlib.suppress(ConnectionError):
+                while more := client.recv(4096):
+                    answer += more
+            answers.append(answer[:13])
+            client.close()
+    assert answers == [b"", b"", b"", b"HTTP/1.1 200 ", b"HTTP/1.1 503 ", b"HTTP/1.1 503 "]
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"GET /state HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n",
+        b"POST /type HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2\r\nContent-Length: 3\r\n\r\n{} ",
+        b"POST /type HTTP/1.1\r\nHost: localhost\r\nContent-Length: +2\r\n\r\n{}",
+        b"POST /type HTTP/1.1\r\nHost: localhost\r\nContent-Length: \xb2\r\n\r\n{}",
+        b"POST /type HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + b"9" * 9000 + b"\r\n\r\n{}",
+        b"GET /state HTTP/1.1\r\nHost: localhost\r\n folded\r\n\r\n",
+        b"GET /state HTTP/1.1\r\nHo\0st: localhost\r\n\r\n",
+        b"GET  /state HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        b"GET /state\r\n\r\n",
+    ],
+)
+def test_what_two_readers_could_read_in_two_ways_is_turned_away(served: HttpControl, data: bytes) -> None:
+    assert raw(served, data).startswith(b"HTTP/1.1 400 ")
+
+
+def test_a_client_that_asks_first_whether_it_may_send_its_body_is_told_so(served: HttpControl) -> None:
+    with socket.create_connection(served.address[:2], timeout=60) as client:
+        client.sendall(b"POST /faults HTTP/1.1\r\nHost: localhost\r\nExpect: 100-continue\r\nContent-Length: 2\r\n\r\n")
+        assert client.recv(25, socket.MSG_WAITALL) == b"HTTP/1.1 100 Continue\r\n\r\n"
+        client.sendall(b"{}")
+        assert client.recv(13, socket.MSG_WAITALL) == b"HTTP/1.1 200 "
 
 
 def until_waiting(control: Control) -> None:

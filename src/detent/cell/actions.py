@@ -15,6 +15,12 @@ class Send(NamedTuple):
     data: Chars
 
 
+class Discard(NamedTuple):
+    """The host of a line takes back what it has not begun to send."""
+
+    line: int
+
+
 class Type(NamedTuple):
     """The host of a unit sends it a command line; its link adds address, checksum and terminator."""
 
@@ -101,7 +107,20 @@ class Mend(NamedTuple):
 
 
 Action: TypeAlias = (
-    Send | Type | SetSwitch | SetPin | Release | Power | Start | Load | PlaceSwitch | Halt | Displace | Break | Mend
+    Send
+    | Discard
+    | Type
+    | SetSwitch
+    | SetPin
+    | Release
+    | Power
+    | Start
+    | Load
+    | PlaceSwitch
+    | Halt
+    | Displace
+    | Break
+    | Mend
 )
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from detent.cell.actions import (
     Action,
     Break,
+    Discard,
     Displace,
     Halt,
     Load,
@@ -184,6 +185,8 @@ class Cell(Delivery):
         match action:
             case Send(line, data):
                 self.send(line, data)
+            case Discard(line):
+                self.discard(line)
             case Type(unit, text):
                 self.type(unit, text)
             case SetSwitch(switch, level):
@@ -228,6 +231,14 @@ class Cell(Delivery):
             self._plan_lines()
         if not self._acting:
             self._catch_up()
+
+    def discard(self, line: int) -> None:
+        """The host of a line takes back what it has not begun to send, now; a character that has begun goes on."""
+        if not self._acting:
+            self._catch_up()
+            self._keep(Discard(line))
+        self.lines[line].discard()
+        self._plan_lines()
 
     def type(self, unit: str, text: str) -> None:
         """The host of the unit's line sends the command line `text` to that unit, now."""

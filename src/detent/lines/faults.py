@@ -244,6 +244,11 @@ class FaultyLine(Line):
         self.line.send(data, now)
         self._gather()
 
+    def discard(self) -> None:
+        """The host takes back what it has not begun to send."""
+        self.line.discard()
+        self._plan()
+
     def change(self, form: Format) -> None:
         """The host speaks in another format from now on."""
         self.line.change(form)

@@ -83,6 +83,11 @@ class Line:
         self._host.send(data, now)
         self._plan()
 
+    def discard(self) -> None:
+        """The host takes back what it has not begun to send."""
+        self._host.discard()
+        self._plan()
+
     def change(self, form: Format) -> None:
         """The host speaks in another format from now on; what it has not begun to send is lost."""
         self._host.discard()

@@ -20,10 +20,10 @@ from detent.realtime.service import Service
 from detent.realtime.verbs import Answer, AskedWrongly, Json
 from detent.realtime.waiting import Condition, at_position, at_time
 from detent.realtime.watch import Watch
-from detent.ticks import SECOND
+from detent.ticks import SECOND, Ns
 
-PATIENCE: Final = 60.0  # seconds of the wall clock that `wait` and `run-for` wait
-GRACE: Final = 10.0  # seconds in which the loop begins what it is asked
+SLICE: Final = 200  # events of a long step between which others have their turn
+LONGEST_QUEUE: Final = 60 * SECOND  # that characters take which wait on a line
 
 Given = dict[str, object]
 
@@ -45,6 +45,7 @@ class Control:
         self._lock = threading.Lock()  # over the two that follow
         self._ended = False
         self._waited_for: set[Future[Answer]] = set()
+        self._stepping: Future[Answer] | None = None  # a step that takes long
         self._does: Mapping[str, Callable[[Given], Answer | Future[Answer]]] = {
             "state": self._state,
             "pins": self._pins,
@@ -59,6 +60,7 @@ class Control:
             "pace": self._change_pace,
             "type": self._type,
             "send": self._send,
+            "clear": self._clear,
             "wait": self._wait,
             "journal": self._journal,
             "faults": self._faults,
@@ -72,7 +74,7 @@ class Control:
     def do(self, verb: str, given: Mapping[str, object]) -> Answer | Future[Answer]:
         """Do it, now, on the thread that serves. Raises AskedWrongly, and what the cell raises.
 
-        The answer of `wait` and `run-for` is to come: cancel it to wait no longer.
+        The answer of a verb that `waits` may be to come: cancel it to wait no longer.
         """
         arguments = verbs.verb(verb).read(given)
         self._refuse_on_real_pins(verb, arguments)
@@ -86,8 +88,13 @@ class Control:
         return answer
 
     def ask(self, verb: str, given: Mapping[str, object]) -> "Future[Answer]":
-        """The same from any thread; cancelled if the cell is not served any more."""
+        """The same from any thread; cancelled when the cell is not served any more. Raises Ending."""
         promised: Future[Answer] = Future()
+        with self._lock:
+            if self._ended:
+                raise Ending("the cell is not served any more")
+            self._waited_for.add(promised)
+        promised.add_done_callback(self._waited_for.discard)
         asked = self._service.ask(lambda: self.do(verb, given))
 
         def pass_on(done: "Future[Answer]") -> None:
@@ -120,36 +127,30 @@ class Control:
         asked.add_done_callback(begun)
         return promised
 
+    @staticmethod
+    def late(verb: str) -> Answer:
+        """What is answered, with the state, when the time is over before what is waited for. Raises Ending."""
+        if not verbs.verb(verb).waits:
+            raise Ending("the cell does not answer")
+        return {"reached": False}
+
     def call(self, verb: str, given: Mapping[str, object]) -> Answer:
         """The same, and wait for the answer: not on the thread that serves. Raises AskedWrongly, Ending.
 
         Where the time is over before what is waited for, the answer says ``"reached": false``.
         """
-        waits = any(parameter is verbs.TIMEOUT for parameter in verbs.verb(verb).parameters)
-        patience = GRACE
-        if waits:
-            timeout = verbs.verb(verb).read(given).get("timeout")
-            patience = timeout / SECOND if isinstance(timeout, int) else PATIENCE
-        with self._lock:
-            if self._ended:
-                raise Ending("the cell is not served any more")
-            promised = self.ask(verb, given)
-            self._waited_for.add(promised)
+        patience = verbs.verb(verb).patience(given)
+        promised = self.ask(verb, given)
         try:
             return promised.result(patience)
         except TooLate:
             promised.cancel()
         except CancelledError:
             raise Ending("the cell is not served any more") from None
-        finally:
-            with self._lock:
-                self._waited_for.discard(promised)
-        if waits:
-            return {"reached": False} | self.call("state", {})
-        raise Ending("the cell does not answer")
+        return self.late(verb) | self.call("state", {})
 
     def end(self) -> None:
-        """Whoever waits in `call` is told that it ends, and whoever calls from now on. From any thread."""
+        """Whoever waits for an answer is told that it ends, and whoever asks from now on. From any thread."""
         with self._lock:
             self._ended = True
             waiting = list(self._waited_for)
@@ -253,8 +254,11 @@ class Control:
         return self._now()
 
     def _type(self, given: Given) -> Answer:
-        unit = self._names.unit(given)
-        self._cell.type(unit, str(given["text"]))
+        unit, text = self._names.unit(given), str(given["text"])
+        line = self._cell.wiring.line_of[self._cell.unit(unit)]
+        if line >= 0:
+            self._refuse_a_long_queue(line, len(self._cell.talker(unit).frame(text)))
+        self._cell.type(unit, text)
         return self._now()
 
     def _send(self, given: Given) -> Answer:
@@ -262,8 +266,24 @@ class Control:
             data = str(given["data"]).encode("latin-1").decode("unicode_escape").encode("latin-1")
         except UnicodeError:
             raise AskedWrongly("data has characters that are no bytes", r"write them like \r or \x1b") from None
-        self._cell.send(self._names.line(given.get("line")), data)
+        line = self._names.line(given.get("line"))
+        self._refuse_a_long_queue(line, len(data))
+        self._cell.send(line, data)
         return self._now()
+
+    def _clear(self, given: Given) -> Answer:
+        self._cell.discard(self._names.line(given.get("line")))
+        return self._now()
+
+    def _refuse_a_long_queue(self, number: int, more: int) -> None:
+        line = self._cell.lines[number]
+        waits = max(line.host_busy_until - self._cell.now, 0)
+        if waits + line.format.duration(more) > LONGEST_QUEUE:
+            name = self._cell.wiring.line_names[number]
+            told = f"{waits / SECOND:.1f} s of characters wait on line {name}, and these would be {more} more"
+            raise AskedWrongly(
+                told, f"at most {LONGEST_QUEUE // SECOND} s of them wait: send fewer, or drop them (clear)"
+            )
 
     # -- time --------------------------------------------------------------------------------------------
 
@@ -271,24 +291,59 @@ class Control:
         return time_of(self._service)
 
     def _stand(self, _: Given) -> Answer:
+        self._end_step()
         if not self._pace.held:
             self._pace.hold(self._cell.now)
         return self._now()
 
     def _go(self, _: Given) -> Answer:
+        self._end_step()
         if self._pace.held:
             self._pace.go(self._cell.now)
         return self._now()
 
-    def _step(self, given: Given) -> Answer:
+    def _step(self, given: Given) -> "Answer | Future[Answer]":
         cell = self._cell
+        self._end_step()
         time = given.get("time")
         if isinstance(time, int):
-            cell.run_to(cell.now + time)
-        else:
-            cell.step()
+            stepping: Future[Answer] = Future()
+            self._step_on(cell.now + time, stepping)
+            return stepping.result() if stepping.done() else stepping
+        cell.step()
         self._pace.hold(cell.now)
         return self._now()
+
+    def _step_on(self, goal: Ns, stepping: "Future[Answer]") -> None:
+        """Go on towards `goal` for a while; then it is the turn of the lines and of other requests."""
+        if stepping.done():  # nobody waits for it any more, or another word about time has ended it
+            return
+        cell = self._cell
+        self._stepping = stepping
+        try:
+            for _ in range(SLICE):
+                at = cell.next_event()
+                cell.run_to(goal if at is None else min(at, goal))
+                self._watched.look()
+                if stepping.done() or cell.now == goal:
+                    break
+        except Exception as error:
+            if not stepping.done() and stepping.set_running_or_notify_cancel():
+                stepping.set_exception(error)
+            raise
+        finally:
+            self._pace.hold(cell.now)
+        if cell.now < goal:
+            following = self._service.ask(lambda: self._step_on(goal, stepping))
+            following.add_done_callback(lambda ended: stepping.cancel() if ended.cancelled() else None)
+        elif not stepping.done() and stepping.set_running_or_notify_cancel():
+            stepping.set_result(self._now())
+
+    def _end_step(self) -> None:
+        """Another word about time ends a step that takes long: whoever waits for it is told where the cell stands."""
+        stepping, self._stepping = self._stepping, None
+        if stepping is not None and not stepping.done() and stepping.set_running_or_notify_cancel():
+            stepping.set_result({"reached": False, **whole_state(self._service)})
 
     def _run_for(self, given: Given) -> "Future[Answer]":
         time = given["time"]

@@ -3,8 +3,13 @@
 ``GET /`` lists the verbs. ``POST /VERB`` with an object of arguments does one; what changes nothing may be asked with
 ``GET /VERB?NAME=VALUE``. Every error is ``{"error": ..., "remedy": ...}``. A web page cannot reach it: requests that
 name another host, or come from another origin, are turned away.
+
+One thread with a loop of its own answers everybody, so that a client that is slow costs nobody anything. Whoever has
+not said what he wants in `QUIET` seconds is sent away, sooner where there is no room for another. Whoever waits for the
+cell and leaves is waited for no more.
 """
 
+import asyncio
 import contextlib
 import hmac
 import ipaddress
@@ -14,22 +19,23 @@ import sys
 import threading
 import traceback
 from collections.abc import Mapping
+from concurrent.futures import Future
+from enum import Enum, auto
 from http import HTTPStatus
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 from urllib.parse import SplitResult, parse_qsl, urlsplit
 
 import detent
-from detent.realtime import openapi, verbs
+from detent.realtime import http1, openapi, verbs
 from detent.realtime.control import Ending
 from detent.realtime.endpoints.endpoint import EndpointError
 from detent.realtime.endpoints.tcp import TcpAddress
 from detent.realtime.verbs import Answer, AskedWrongly, Json
 
-LONGEST_BODY: Final = 64 << 10  # bytes
-MOST_IGNORED: Final = 1 << 20  # bytes of a longer one that are read before it is turned away
-QUIET: Final = 10.0  # seconds in which a client has to say what it wants
-MOST_CLIENTS: Final = 64  # at once; the next waits
+QUIET: Final = 10.0  # seconds in which a client has to say what it wants, and to take the answer
+MOST_CLIENTS: Final = 128  # at once; one more takes the place of the one that has said nothing for longest
+MOST_WAITING: Final = 64  # of them that wait for the cell
+PARTING: Final = 0.5  # seconds in which clients take their last answers when it ends
 SHORTEST_TOKEN: Final = 8  # characters
 TOKEN: Final = "DETENT_TOKEN"  # the variable of the environment
 
@@ -37,8 +43,11 @@ TOKEN: Final = "DETENT_TOKEN"  # the variable of the environment
 class Doer(Protocol):
     """Whoever does the verbs (`realtime.control.Control`)."""
 
-    def call(self, verb: str, given: Mapping[str, object]) -> Answer:
-        """Do it and wait for the answer. Raises AskedWrongly, Ending."""
+    def ask(self, verb: str, given: Mapping[str, object]) -> "Future[Answer]":
+        """Do it; the answer is to come. Raises Ending."""
+
+    def late(self, verb: str) -> Answer:
+        """What is answered when the answer has not come in time. Raises Ending."""
 
     def end(self) -> None:
         """Whoever waits is told that it ends."""
@@ -53,7 +62,7 @@ class _Refused(Exception):
 
 
 class HttpControl:
-    """Listens at `address` and answers in threads of its own, until it is closed."""
+    """Listens at `address` and answers in a thread of its own, until it is closed."""
 
     def __init__(self, control: Doer, address: TcpAddress, token: str | None = None) -> None:
         """Raises EndpointError if the port cannot be had, or is open to others without a `token`, or that is short."""
@@ -64,15 +73,20 @@ class HttpControl:
                 f"{address} is open to other computers: give --token TEXT or ${TOKEN}, or listen on 127.0.0.1"
             )
         try:
-            self._server = _Server(address, control, token or "")
+            listener = _listen(address)
         except (OSError, UnicodeError) as error:
             reason = getattr(error, "strerror", None) or error
             raise EndpointError(
                 f"{address} cannot be listened on: {reason}; choose another port, or 0 for any free one"
             ) from error
-        host, port = self._server.server_address[:2]
+        host, port = listener.getsockname()[:2]
         self.address = TcpAddress(str(host), int(port))
-        self._thread = threading.Thread(target=self._server.serve_forever, args=(0.05,), name="control", daemon=True)
+        self._control = control
+        self._clients = _Clients(control, token or "")
+        self._loop = asyncio.new_event_loop()
+        self._loop.set_exception_handler(_of_a_connection)
+        self._ending = asyncio.Event()
+        self._thread = threading.Thread(target=self._run, args=(listener,), name="control", daemon=True)
         self._thread.start()
 
     @property
@@ -82,11 +96,25 @@ class HttpControl:
         return f"http://{self.address._replace(host=host)}"
 
     def close(self) -> None:
-        """Whoever still waits for the cell is told that it ends; then nobody is listened to any more."""
-        self._server.control.end()
-        self._server.shutdown()
+        """Whoever still waits for the cell is told that it ends; then nobody is listened to any more. Soon over."""
+        self._control.end()
+        with contextlib.suppress(RuntimeError):  # it was closed before
+            self._loop.call_soon_threadsafe(self._ending.set)
         self._thread.join()
-        self._server.server_close()
+
+    def _run(self, listener: socket.socket) -> None:
+        try:
+            self._loop.run_until_complete(self._serve(listener))
+        finally:
+            self._loop.close()
+
+    async def _serve(self, listener: socket.socket) -> None:
+        server = await asyncio.start_server(
+            self._clients.connected, sock=listener, limit=http1.LONGEST_HEAD, backlog=MOST_CLIENTS
+        )
+        await self._ending.wait()
+        server.close()
+        await self._clients.part()
 
 
 def is_loopback(host: str) -> bool:
@@ -99,70 +127,119 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-class _Server(ThreadingHTTPServer):
-    daemon_threads = False  # `server_close` waits for those that answer
-    request_queue_size = 2 * MOST_CLIENTS  # a system turns those away for whom there is no place to wait
-
-    def __init__(self, address: TcpAddress, control: Doer, token: str) -> None:
-        self.control, self.token = control, token
-        found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-        self.address_family = found[0][0]
-        self._room = threading.BoundedSemaphore(MOST_CLIENTS)
-        self._open: set[socket.socket] = set()
-        self._lock = threading.Lock()
-        super().__init__((address.host, address.port), _Handler)
-
-    def server_bind(self) -> None:
-        """Without the look-up of a name that the standard library makes."""
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        self.socket.bind(self.server_address)
-        self.server_address = self.socket.getsockname()
-        self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
-
-    def process_request(self, request, client_address):  # type: ignore[no-untyped-def]
-        self._room.acquire()
-        with self._lock:
-            self._open.add(request)
-        super().process_request(request, client_address)
-
-    def shutdown_request(self, request):  # type: ignore[no-untyped-def]
-        with self._lock:
-            self._open.discard(request)
-        super().shutdown_request(request)
-        self._room.release()
-
-    def server_close(self) -> None:
-        """Clients that have not yet said what they want are not waited for."""
-        with self._lock:
-            for request in self._open:
-                with contextlib.suppress(OSError):
-                    request.shutdown(socket.SHUT_RD)
-        super().server_close()
-
-    def handle_error(self, request: object, client_address: object) -> None:
-        """A client went away while it was answered: nobody needs to know."""
-        if not isinstance(sys.exception(), OSError):
-            traceback.print_exc()
+def _listen(address: TcpAddress) -> socket.socket:
+    found = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    family, kind, protocol, _, where = found[0]
+    listener = socket.socket(family, kind, protocol)
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(where)
+        listener.listen(MOST_CLIENTS)
+    except OSError:
+        listener.close()
+        raise
+    listener.setblocking(False)
+    return listener
 
 
-class _Handler(BaseHTTPRequestHandler):
-    server: _Server
-    protocol_version = "HTTP/1.1"
-    server_version = f"detent/{detent.__version__}"
-    sys_version = ""
-    timeout = QUIET
+def _of_a_connection(loop: asyncio.AbstractEventLoop, told: dict[str, Any]) -> None:
+    """What asyncio tells of connections that broke, and of descriptors that ran out, is nothing to report."""
+    error = told.get("exception")
+    if error is not None and not isinstance(error, OSError):
+        traceback.print_exception(error, file=sys.stderr)
 
-    def do_GET(self) -> None:
-        """The list of verbs, or a verb that changes nothing."""
-        self._answer()
 
-    do_POST = do_PUT = do_DELETE = do_PATCH = do_HEAD = do_OPTIONS = do_GET
+class _Stage(Enum):
+    """How far a client is."""
 
-    def _answer(self) -> None:
-        self.close_connection = True
+    ASKING = auto()  # it has not said yet what it wants
+    ANSWERED = auto()  # we are to find the answer
+    TAKING = auto()  # it has not taken all of the answer
+
+
+class _Client:
+    """Somebody who is connected."""
+
+    __slots__ = ("stage", "writer")
+
+    def __init__(self, writer: asyncio.StreamWriter) -> None:
+        self.stage, self.writer = _Stage.ASKING, writer
+
+
+class _Clients:
+    """Who is connected, each a task that reads one request and writes one answer."""
+
+    def __init__(self, control: Doer, token: str) -> None:
+        self._control, self._token = control, token
+        self._clients: dict[asyncio.Task[None], _Client] = {}  # the oldest first
+        self._waiting = 0  # for the cell
+
+    async def connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """A client: all of it, from the connection to its end."""
+        task = asyncio.current_task()
+        assert task is not None
+        client = _Client(writer)
+        try:
+            if not self._make_room():
+                return
+            self._clients[task] = client
+            async with asyncio.timeout(QUIET):
+                told = await self._told(reader, writer)
+            client.stage = _Stage.ANSWERED
+            if isinstance(told, http1.Request):
+                told = await self._answer(told, reader)
+            client.stage = _Stage.TAKING
+            writer.write(told)
+            async with asyncio.timeout(QUIET):
+                await writer.drain()
+                writer.write_eof()
+                while await reader.read(1 << 16):  # what it has said too much: closed sooner, it would not hear us
+                    pass
+        except (OSError, EOFError, TimeoutError):
+            pass  # the client is gone, or has said or taken nothing for too long
+        except asyncio.CancelledError:
+            pass  # it ends
+        finally:
+            self._clients.pop(task, None)
+            writer.transport.abort()
+
+    def _make_room(self) -> bool:
+        """Where all places are taken, whoever keeps us waiting for longest leaves; False if nobody does."""
+        if len(self._clients) < MOST_CLIENTS:
+            return True
+        for stage in (_Stage.ASKING, _Stage.TAKING):
+            for task, client in self._clients.items():
+                if client.stage is stage:
+                    client.writer.transport.abort()
+                    del self._clients[task]
+                    return True
+        return False
+
+    async def part(self) -> None:
+        """It ends: those who were promised an answer have a moment to take it."""
+        for task, client in self._clients.items():
+            if client.stage is _Stage.ASKING:
+                task.cancel()
+        everybody = set(self._clients)
+        if everybody:
+            _, left = await asyncio.wait(everybody, timeout=PARTING)
+            for task in left:
+                task.cancel()
+            if left:
+                await asyncio.wait(left)
+
+    async def _told(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> "http1.Request | bytes":
+        """What the client wants; the answer if that is not to be understood."""
+        try:
+            return await http1.read(reader, writer)
+        except http1.Unreadable as wrong:
+            return _written(wrong.status, _error(wrong.what, wrong.remedy))
+
+    async def _answer(self, request: http1.Request, reader: asyncio.StreamReader) -> bytes:
+        """The answer to a request as it is sent."""
         headers: Mapping[str, str] = {}
         try:
-            status, answer = HTTPStatus.OK, self._asked()
+            status, answer = HTTPStatus.OK, await self._asked(request, reader)
         except _Refused as refused:
             status, headers = refused.status, refused.headers
             answer = _error(refused.what, refused.remedy)
@@ -170,102 +247,111 @@ class _Handler(BaseHTTPRequestHandler):
             status, answer = HTTPStatus.BAD_REQUEST, _error(error.what, error.remedy)
         except Ending as error:
             status, answer = HTTPStatus.SERVICE_UNAVAILABLE, _error(str(error), "start it again: detent serve")
-        except OSError:
-            return  # the client is gone, or has said nothing for too long
+        except (OSError, EOFError):
+            raise
         except Exception as error:  # a fault of ours: all of it here, a line of it there
             traceback.print_exc()
             status = HTTPStatus.INTERNAL_SERVER_ERROR
             answer = _error(f"{type(error).__name__}: {error}", "what it was stands in the log of the service")
-        self._send(status, answer, headers)
+        return _written(status, answer, headers, with_body=request.method != "HEAD")
 
-    def _send(self, status: HTTPStatus, answer: Answer, headers: Mapping[str, str]) -> None:
-        body = (json.dumps(answer) + "\n").encode()
-        self.send_response(status)
-        self.send_header("Content-Type", "application/json")
-        self.send_header("Content-Length", str(len(body)))
-        self.send_header("Cache-Control", "no-store")
-        self.send_header("X-Content-Type-Options", "nosniff")
-        self.send_header("Connection", "close")
-        for name, value in headers.items():
-            self.send_header(name.replace("_", "-"), value)
-        self.end_headers()
-        if self.command != "HEAD":
-            self.wfile.write(body)
-
-    def _asked(self) -> Answer:
+    async def _asked(self, request: http1.Request, reader: asyncio.StreamReader) -> Answer:
         """What the request asks, done. Raises what `_answer` knows."""
-        body = self._read()  # first of all: a client that has not got rid of it does not hear the answer
-        self._check_sender()
-        url = _split(self.path, "path")
+        if request.method not in _METHODS:
+            what = f"Unsupported method ({request.method[:20]!r})"
+            raise _Refused(HTTPStatus.METHOD_NOT_ALLOWED, what, "GET / lists the verbs", Allow="GET, POST")
+        self._check_sender(request)
+        url = _split(request.target, "path")
         if url.path == "/":
-            self._check_method("GET")
+            _check_method(request, "GET")
             return _listed()
         if url.path == "/openapi.json":
-            self._check_method("GET")
+            _check_method(request, "GET")
             return openapi.document()
         name = url.path.strip("/")
         if name not in verbs.VERBS:
             error = verbs.unknown("verb", name, tuple(verbs.VERBS))
             raise _Refused(HTTPStatus.NOT_FOUND, error.what, error.remedy)
-        self._check_method(*(["POST"] if verbs.VERBS[name].changes else ["GET", "POST"]))
+        _check_method(request, *(["POST"] if verbs.VERBS[name].changes else ["GET", "POST"]))
         given: dict[str, object] = dict(parse_qsl(url.query, keep_blank_values=True))
-        return self.server.control.call(name, given | _arguments(body))
+        return await self._do(name, given | _arguments(request.body), reader)
 
-    def _check_sender(self) -> None:
+    async def _do(self, verb: str, given: Mapping[str, object], reader: asyncio.StreamReader) -> Answer:
+        """The answer of the cell. A client that leaves while it waits for the cell is waited for no more."""
+        patience, waits = verbs.verb(verb).patience(given), verbs.verb(verb).waits
+        if waits and self._waiting >= MOST_WAITING:
+            what = f"{MOST_WAITING} clients wait for the cell already"
+            raise _Refused(HTTPStatus.SERVICE_UNAVAILABLE, what, "ask again when one of them has its answer")
+        promised = asyncio.wrap_future(self._control.ask(verb, given))
+        gone: asyncio.Task[None] | None = asyncio.create_task(_left(reader)) if waits else None
+        self._waiting += waits
+        try:
+            watched: set[asyncio.Future[Any]] = {promised} if gone is None else {promised, gone}
+            await asyncio.wait(watched, timeout=patience, return_when=asyncio.FIRST_COMPLETED)
+            if promised.done():
+                return promised.result()
+            if gone is not None and gone.done():
+                raise ConnectionError("the client went away")
+        except asyncio.CancelledError:
+            if not promised.cancelled():
+                raise
+            raise Ending("the cell is not served any more") from None
+        finally:
+            self._waiting -= waits
+            promised.cancel()
+            if gone is not None:
+                await _ended(gone)
+        return self._control.late(verb) | await self._do("state", {}, reader)
+
+    def _check_sender(self, request: http1.Request) -> None:
         """No pages of other sites, no names that were pointed here, no strangers."""
-        host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
+        host, origin = request.headers.get("host", ""), request.headers.get("origin")
         name = _split(f"//{host}", "host").hostname or ""
-        if not self.server.token and not is_loopback(name):
+        if not self._token and not is_loopback(name):
             raise _Refused(HTTPStatus.FORBIDDEN, f"host {host!r} is not this one", "ask 127.0.0.1 or localhost")
         if origin is not None and origin not in (f"http://{host}", f"https://{host}"):
             raise _Refused(HTTPStatus.FORBIDDEN, f"origin {origin!r} may not ask", "this is no place for web pages")
-        if self.server.token:
-            scheme, _, token = self.headers.get("Authorization", "").partition(" ")
-            right = hmac.compare_digest(token.strip().encode(), self.server.token.encode())
+        if self._token:
+            scheme, _, token = request.headers.get("authorization", "").partition(" ")
+            right = hmac.compare_digest(token.strip().encode(), self._token.encode())
             if scheme.lower() != "bearer" or not right:
                 what = "the token is wrong" if token else "a token is needed"
                 remedy = f"send Authorization: Bearer TOKEN (detent control: --token or ${TOKEN})"
                 raise _Refused(HTTPStatus.UNAUTHORIZED, what, remedy, WWW_Authenticate="Bearer")
 
-    def _check_method(self, *allowed: str) -> None:
-        if self.command not in allowed:
-            what = f"{self.command} is not for {self.path.partition('?')[0]}"
-            raise _Refused(HTTPStatus.METHOD_NOT_ALLOWED, what, f"use {allowed[-1]}", Allow=", ".join(allowed))
 
-    def _read(self) -> bytes:
-        """The body."""
-        if "chunked" in self.headers.get("Transfer-Encoding", ""):
-            raise _Refused(HTTPStatus.LENGTH_REQUIRED, "the body is chunked", "send a Content-Length")
-        try:
-            length = int(self.headers.get("Content-Length", "0"))
-        except ValueError:
-            length = -1
-        if length < 0:
-            raise _Refused(HTTPStatus.BAD_REQUEST, "Content-Length is no number", "leave it to your library")
-        if length > LONGEST_BODY:
-            left = min(length, MOST_IGNORED)
-            while left > 0 and (ignored := self.rfile.read(min(left, LONGEST_BODY))):
-                left -= len(ignored)
-            remedy = f"at most {LONGEST_BODY} bytes"
-            raise _Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"a body of {length} bytes is too long", remedy)
-        body = self.rfile.read(length)
-        if len(body) < length:
-            raise ConnectionError("the client went away")
-        return body
+_METHODS: Final = ("GET", "POST", "PUT", "DELETE", "PATCH", "HEAD", "OPTIONS")
 
-    def log_message(self, format: str, *args: object) -> None:
-        """Requests are not logged."""
 
-    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """What the standard library turns away itself: an error like all others."""
-        self.close_connection = True
-        status = HTTPStatus(code)
-        if getattr(self, "command", None) is None:
-            self.command = ""
-        with contextlib.suppress(OSError):
-            if status is HTTPStatus.NOT_IMPLEMENTED:  # a method that nobody has heard of
-                status = HTTPStatus.METHOD_NOT_ALLOWED
-            self._send(status, _error(message or status.phrase, "send HTTP/1.1 requests: GET / lists the verbs"), {})
+async def _left(reader: asyncio.StreamReader) -> None:
+    """Come back when the client has left. What else it says is nothing to us."""
+    with contextlib.suppress(OSError):
+        while await reader.read(1 << 16):
+            pass
+
+
+async def _ended(task: "asyncio.Task[None]") -> None:
+    task.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await task
+
+
+def _check_method(request: http1.Request, *allowed: str) -> None:
+    if request.method not in allowed:
+        what = f"{request.method} is not for {request.target.partition('?')[0]}"
+        raise _Refused(HTTPStatus.METHOD_NOT_ALLOWED, what, f"use {allowed[-1]}", Allow=", ".join(allowed))
+
+
+def _written(status: HTTPStatus, answer: Answer, headers: Mapping[str, str] = {}, *, with_body: bool = True) -> bytes:
+    """An answer as it is sent."""
+    told = {
+        "Server": f"detent/{detent.__version__}",
+        "Content-Type": "application/json",
+        "Cache-Control": "no-store",
+        "X-Content-Type-Options": "nosniff",
+        **{name.replace("_", "-"): value for name, value in headers.items()},
+    }
+    return http1.answer(status, told, (json.dumps(answer) + "\n").encode(), with_body=with_body)
 
 
 def _split(text: str, what: str) -> SplitResult:

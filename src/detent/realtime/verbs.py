@@ -10,6 +10,8 @@ from typing import Final, NamedTuple, TypeAlias
 
 from detent.ticks import SECOND, parse_duration
 
+SHORT_WAIT: Final = 60.0  # seconds of the wall clock that what waits waits, unless it is said otherwise
+GRACE: Final = 10.0  # seconds in which the loop begins what it is asked
 LONGEST_WAIT: Final = 24 * 3600 * SECOND  # clocks of operating systems do not count as far as ours
 
 Json: TypeAlias = "str | int | float | bool | Sequence[Json] | Mapping[str, Json] | None"
@@ -133,6 +135,18 @@ class Verb(NamedTuple):
     changes: bool = True
     placed: int = 99
 
+    @property
+    def waits(self) -> bool:
+        """Whether its answer may be long in coming."""
+        return TIMEOUT in self.parameters
+
+    def patience(self, given: Mapping[str, object]) -> float:
+        """How many seconds of the wall clock an answer to these arguments may take. Raises AskedWrongly."""
+        if not self.waits:
+            return GRACE
+        timeout = self.read(given).get("timeout")
+        return timeout / SECOND if isinstance(timeout, int) else SHORT_WAIT
+
     def read(self, given: Mapping[str, object]) -> dict[str, object]:
         """The arguments by name; those not given are left out. Raises AskedWrongly."""
         by_name = {parameter.name: parameter for parameter in self.parameters}
@@ -174,7 +188,7 @@ VERBS: Final[Mapping[str, Verb]] = {
         Verb("pause", "Let the cell time stand. What clients send waits."),
         Verb("resume", "Let the cell time go on."),
         Verb("step", "While it stands: everything of the next eventful instant, or of a time; it stands again behind.",
-             (Parameter("time", TIME, "how long the cell goes on, at once; one event without it"),)),
+             (Parameter("time", TIME, "how long the cell goes on, as fast as it can; one event without it"), TIMEOUT)),
         Verb("run-for", "Let the cell go on for a time, at its pace; then it stands. Answers when it does.",
              (Parameter("time", TIME, "of the cell", True), TIMEOUT)),
         Verb("pace", "How many times as fast as real time the cell goes; free: as fast as it can.",
@@ -184,6 +198,8 @@ VERBS: Final[Mapping[str, Verb]] = {
         Verb("send", "The host of a line sends characters as they are.",
              (Parameter("data", TEXT, "characters; \\r, \\n and \\x1b are written so", True, several=True),
               Parameter("line", TEXT, "a line; may be left out where there is only one")), placed=1),
+        Verb("clear", "What waits to be sent on a line is dropped. A character that has begun ends.",
+             (Parameter("line", TEXT, "a line; may be left out where there is only one"),)),
         Verb("wait", "Answer when everything that is named is so at once: a state, a position, a level, a time.",
              (UNIT,
               Parameter("state", TEXT, "what the unit does: a word, or several with commas"),

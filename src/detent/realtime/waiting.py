@@ -91,7 +91,8 @@ class Watched:
 
         waiter = _Waiter(conditions, tell, future)
         if not waiter.over():
-            self._waiters.append(waiter)
+            # those who wait no longer go now: a cell that stands is not looked at
+            self._waiters = [*(other for other in self._waiters if not other.future.cancelled()), waiter]
         return future
 
     def look(self) -> None:

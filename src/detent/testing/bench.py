@@ -12,7 +12,7 @@ from typing import Any, Final
 from detent.cell.description import Description, Problem, parse, single
 from detent.controllers import catalogue
 from detent.realtime import verbs
-from detent.realtime.control import PATIENCE, Control
+from detent.realtime.control import Control
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.images import Images, cell_name
 from detent.realtime.service import Service, models
@@ -166,7 +166,7 @@ class Served:
         """Let the cell time go on."""
         self.do("resume")
 
-    def run_for(self, time: str | float, timeout: float = PATIENCE) -> None:
+    def run_for(self, time: str | float, timeout: float = verbs.SHORT_WAIT) -> None:
         """Let the cell go on for so long, then stand. Raises TimeoutError where that takes longer than `timeout`.
 
         `time` is of the cell, `timeout` seconds of the wall clock.
