@@ -5,12 +5,12 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
+from tests.workbench.patience import PATIENCE
 
 from detent.cell.description import Problem
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.workbench.client import Bench, BenchError
 
-PATIENCE = 60  # seconds, when something is broken
 CELL = """
 [units.x]
 model = "gs-c200"

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.workbench.patience import PATIENCE
 
 from detent.cell.description import Problem
 from detent.realtime.endpoints.spec import EndpointSpec
@@ -22,7 +23,7 @@ from detent.workbench.messages import State
 from detent.workbench.scope import Trigger
 
 DRILLING = str(Path(__file__).parents[2] / "examples" / "drilling" / "cell.toml")
-PATIENCE = 60  # seconds, when something is broken
+
 LOOP = "S50\nL0\nA1\n+20\nC1\nD1\nL200\n"  # addresses 0 4 6 8 12 14 16
 
 

@@ -1,6 +1,7 @@
 """Nothing is lost: files are not written over unasked, and what is sent into a standing cell waits in the open."""
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -45,8 +46,13 @@ class Bench:
             units={"bar": SimpleNamespace(line="bar")}, lines={"bar": SimpleNamespace(host=None)}
         )
         self.sent: list[object] = []
+        self.changed: Callable[[], None] = lambda: None
+
+    def on_change(self, callback: Callable[[], None]) -> None:
+        self.changed = callback
 
     async def type(self, unit: str, text: str) -> None:
+        await asyncio.sleep(0)  # it goes to another process
         if text == "BAD":
             raise RuntimeError("no command")
         self.sent.append((unit, text))
@@ -87,7 +93,45 @@ def test_a_command_that_is_refused_on_its_way_out_does_not_take_the_others_along
     asyncio.run(scene())
 
 
+@pytest.mark.parametrize("text", ["\u20ac", "V1\rV1", "\xb0"])
+def test_what_no_line_can_carry_is_refused_before_it_waits(text: str) -> None:
+    waiting = Waiting(Bench(held=True), Live())  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="printable ASCII"):
+        asyncio.run(waiting.type("bar", text))
+
+
 def test_while_time_goes_everything_is_sent_at_once() -> None:
     bench = Bench(held=False)
     asyncio.run(Waiting(bench, Live()).type("bar", "+1"))  # type: ignore[arg-type]
     assert bench.sent == [("bar", "+1")]
+
+
+def test_what_waits_is_sent_once_however_often_time_is_told_to_go_on() -> None:
+    async def scene() -> None:
+        bench, live = Bench(held=True), Live()
+        waiting = Waiting(bench, live)  # type: ignore[arg-type]
+        for text in ("+1", "+2", "+3"):
+            await waiting.type("bar", text)
+        await asyncio.gather(waiting.out(), waiting.out(), waiting.out())
+        assert bench.sent == [("bar", "+1"), ("bar", "+2"), ("bar", "+3")]
+
+    asyncio.run(scene())
+
+
+def test_what_comes_to_wait_while_time_is_told_to_go_on_goes_out_as_soon_as_it_does() -> None:
+    async def scene() -> None:
+        bench, live = Bench(held=True), Live()
+        waiting = Waiting(bench, live)  # type: ignore[arg-type]
+        await waiting.out()  # the first half of a go
+        await waiting.type("bar", "BAD")
+        await waiting.type("bar", "+1")
+        bench.state.held = False  # the second, or a run to the cursor
+        bench.changed()
+        bench.changed()
+        while not bench.sent:
+            await asyncio.sleep(0)
+        assert live.get("queue") == []
+        assert bench.sent == [("bar", "+1")]
+        assert live.get("turneddown") == "BAD: no command"
+
+    asyncio.run(scene())

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.workbench.patience import PATIENCE
 
 from detent.cell.build import build
 from detent.cell.cell import Cell
@@ -27,7 +28,6 @@ from detent.workbench.units.asked import look
 from detent.workbench.units.registry import Units
 from detent.workbench.units.unit import UnitBusy, options_of
 
-PATIENCE = 120  # seconds: nothing here takes that long
 DRIVERS: dict[str, Callable[[HostPort], Any]] = {
     "gs-c200": lambda port: BlockingGsC200(GsC200(), port),
     "gs-c200s": lambda port: BlockingGsC200(GsC200("gs-c200s"), port),

@@ -1,13 +1,14 @@
 """The state of a cell as the table that windows show (see `live`), and the actions that windows may do to it.
 
-Keys: ``now begin end pace held why past faster late dropped marks crashed title queue faults branches``; of real pins
-``real`` (driven, fault, None) ``realwhy slips``; for each unit ``u.UNIT.`` and
+Keys: ``now begin end pace held why past faster late dropped marks crashed title queue turneddown faults branches``; of
+real pins ``real`` (driven, fault, None) ``realwhy slips``; for each unit ``u.UNIT.`` and
 ``powered state address running error errorat hand reg unsaved stored memory pin.PIN x.AXIS.position|shaft|pulses|rate``
 (a single axis has no name: ``x..position``); for each switch ``s.SWITCH.`` and ``level low high``; for each motor
 ``m.MOTOR.`` and ``place command speed lost``; for each line ``l.LINE.format``. Times are in ns,
 places in steps, rates in steps/s.
 """
 
+import asyncio
 from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Annotated
@@ -109,17 +110,19 @@ def _unit(values: dict[str, Value], key: str, unit: UnitState) -> None:
 def _offer(bench: "Bench", live: Live) -> None:
     """What a window may do to the cell."""
     waiting = Waiting(bench, live)
+    turning = asyncio.Lock()  # a notch is counted from where the one before has come to
 
     async def pace(times: Annotated[float, Field(ge=1e-6, le=1e6)] | None) -> None:
         await bench.pace(times)
 
     async def notch(by: int) -> None:
         ladder = [float("inf") if one is None else one for one in PACES]
-        now = float("inf") if bench.state.pace is None else bench.state.pace
-        rest = [one for one in ladder if (one > now if by > 0 else one < now)]
-        if rest:
-            chosen = min(rest) if by > 0 else max(rest)
-            await bench.pace(chosen if isfinite(chosen) else None)
+        async with turning:
+            now = float("inf") if bench.state.pace is None else bench.state.pace
+            rest = [one for one in ladder if (one > now if by > 0 else one < now)]
+            if rest:
+                chosen = min(rest) if by > 0 else max(rest)
+                await bench.pace(chosen if isfinite(chosen) else None)
 
     async def faster() -> None:
         await notch(1)

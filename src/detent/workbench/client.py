@@ -117,6 +117,7 @@ class Bench:
         self._marks: tuple[Mark, ...] = ()
         self._ready: asyncio.Future[None] | None = None
         self._closing = False
+        self._opening = asyncio.Lock()  # one engine at a time is begun
 
     # -- the engine ----------------------------------------------------------------------------------------
 
@@ -341,6 +342,10 @@ class Bench:
         """The cell stops whenever the unit's program comes to one of these addresses, before it goes on."""
         await self._ask("set_breakpoints", unit, tuple(addresses))
 
+    async def set_breakpoint(self, unit: str, address: int, *, on: bool) -> None:
+        """One of them is there from now on, or not."""
+        await self._ask("set_breakpoint", unit, address, on)
+
     async def break_on_errors(self, on: bool) -> None:
         """The cell stops whenever a unit refuses something."""
         await self._ask("set_break_on_errors", on)
@@ -446,6 +451,10 @@ class Bench:
 
         It is held. If too much was done to be kept, it begins anew, and only programs that were loaded are loaded.
         """
+        async with self._opening:
+            await self._revive()
+
+    async def _revive(self) -> None:
         if self.engine_pid is not None:
             raise BenchError("the cell's process is alive: restart it instead")
         mirror, end = self._mirror, self.state.end
@@ -465,6 +474,10 @@ class Bench:
         If that fails the old one is begun anew. Raises Problem, BenchError.
         """
         find_cell(target)  # what is wrong with it is said while the old one goes on
+        async with self._opening:
+            await self._open_another(target)
+
+    async def _open_another(self, target: str) -> None:
         before = self._order
         order = before._replace(target=target, straps=(), options=(), actions=(), until=0)
         await self.close()

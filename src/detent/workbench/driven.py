@@ -237,6 +237,11 @@ class DrivenEngine(Engine):
         if addresses:
             raise ValueError(NOT_REAL)
 
+    def set_breakpoint(self, unit: str, address: int, on: bool) -> None:
+        """Nor can one be set."""
+        if on:
+            raise ValueError(NOT_REAL)
+
     def set_break_on_errors(self, on: bool) -> None:
         """Not on errors either."""
         if on:
@@ -261,7 +266,7 @@ class DrivenEngine(Engine):
     _VERBS: ClassVar[dict[str, Callable[..., object]]] = {
         **Engine._VERBS,  # noqa: SLF001 (of its own kind)
         **{verb.__name__: verb for verb in (stop_motors, recover, go, hold, rewind, step_event, set_breakpoints,
-                                            set_break_on_errors, pace)},
+                                            set_breakpoint, set_break_on_errors, pace)},
         **dict.fromkeys(("step_instruction", "run_to_address", "place_switch", "restart", "take_branch",
                          "compare_branch", "breaks", "mend"), refuse),
     }  # fmt: skip

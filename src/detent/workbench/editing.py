@@ -22,7 +22,7 @@ Text = Annotated[str, Field(max_length=LONGEST)]
 Name = Annotated[str, Field(max_length=1024)]
 Address = Annotated[int, Field(ge=0, le=1 << 16)]
 
-CALLS = ("about", "check", "load", "save", "compare", "fetch", "breaks", "run_to")
+CALLS = ("about", "check", "load", "save", "compare", "fetch", "breakpoint", "breaks", "run_to")
 
 
 class Editing:
@@ -160,6 +160,10 @@ class Editing:
         return all(image[place.address : place.end] == place.code for place in checked.places.values())
 
     # -- the debugger --------------------------------------------------------------------------------------
+
+    async def breakpoint(self, unit: Name, address: Address, on: bool) -> None:
+        """A breakpoint of a unit is there from now on, or not; the others stay."""
+        await self._bench.set_breakpoint(unit, address, on=on)
 
     async def breaks(self, unit: Name, addresses: Annotated[list[Address], Field(max_length=1000)]) -> None:
         """The breakpoints of a unit."""

@@ -399,6 +399,11 @@ class Engine:
         others = {place for place in self.history.breakpoints if place[0] != index}
         self.history.breakpoints = others | {(index, address) for address in addresses}
 
+    def set_breakpoint(self, unit: str, address: int, on: bool) -> None:
+        """One of them is there from now on, or not."""
+        place = self.history.cell.unit(unit), address
+        self.history.breakpoints = self.history.breakpoints | {place} if on else self.history.breakpoints - {place}
+
     def set_break_on_errors(self, on: bool) -> None:
         """Whether it stops at errors."""
         self.history.break_on_errors = on
@@ -417,9 +422,11 @@ class Engine:
 
     def set_pin(self, unit: str, pin: str, level: Level | None) -> None:
         """Hold a wire to an input, or take it away."""
-        known = {p.name: p for p in self.history.cell.parts[self.history.cell.unit(unit)].pins if p.kind.reads}
+        part = self.history.cell.parts[self.history.cell.unit(unit)]
+        straps = getattr(part, "straps", {})  # a pin of the line may be one, too: RXD of a GS-C200
+        known = [p.name for p in part.pins if p.kind.reads or p.name in straps]
         if pin not in known:
-            raise catalogue.unknown(f"input of {unit}", pin, tuple(known))
+            raise catalogue.unknown(f"input of {unit}", pin, known)
         if level is None:
             self._do(Release(unit, pin), unit, f"{pin} released")
         else:
@@ -510,6 +517,7 @@ class Engine:
     _VERBS: ClassVar[dict[str, Callable[..., object]]] = {
         verb.__name__: verb
         for verb in (hold, go, step_event, step_instruction, step_back, rewind, run_to_address, set_breakpoints,
+                     set_breakpoint,
                      take_branch, compare_branch,
                      set_break_on_errors, power, set_switch, set_pin, place_switch, send_line, type, load, start, save,
                      breaks, mend,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from detent.ticks import MS, Ns, parse_duration
 from detent.workbench.live import Live, Value
+from detent.workbench.words import check_typed
 
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
@@ -56,7 +57,10 @@ def parse(text: str, comment: str = ";") -> list[Step]:
         if not line:
             continue
         if not line.startswith("@"):
-            steps.append(Command(number, line))
+            try:
+                steps.append(Command(number, check_typed(line)))
+            except ValueError as error:
+                raise ValueError(f"line {number}: {error}") from None
         elif line[1:].strip().lower() == "answer":
             steps.append(Answered(number))
         elif line[1:].strip().lower() == "again":

@@ -3,14 +3,17 @@
 A byte that is sent into a standing cell could not be taken back, and into its past it would drop what came after.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+import asyncio
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from detent.workbench.live import Live, Value
+from detent.workbench.words import check_typed
 
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
 
 MOST = 1000
+REFUSED: Final = (ValueError, KeyError, RuntimeError)  # what a bench raises for a command that it does not take
 
 
 class Waits(NamedTuple):
@@ -29,10 +32,13 @@ class Waiting:
         self._bench, self._live = bench, live
         self._queue: list[Waits] = []
         self._number = 0
+        self._sending: asyncio.Task[None] | None = None
         self._tell()
+        bench.on_change(self._see)
 
     async def type(self, unit: str, text: str) -> None:
         """Send a unit a command line, or keep it until time goes on. Raises what the bench does."""
+        check_typed(text)
         if self._sends_now():
             await self._bench.type(unit, text)
             return
@@ -63,17 +69,37 @@ class Waiting:
         self._tell()
 
     async def out(self) -> None:
-        """Time goes on: everything is sent, in its order. What is refused is told, and the rest stays."""
+        """Time goes on: everything is sent, in its order and once. What is refused is told, and the rest stays."""
         while self._queue:
-            one = self._queue[0]
-            try:
-                if one.unit is None:
-                    await self._bench.send(one.line, one.text.encode("latin-1"))
-                else:
-                    await self._bench.type(one.unit, one.text)
-            finally:
-                self._queue = [other for other in self._queue if other.number != one.number]
-                self._tell()
+            await self._send(self._first())
+
+    def _first(self) -> Waits:
+        """The one that is to be sent, which waits no more."""
+        one = self._queue.pop(0)
+        self._tell()
+        return one
+
+    async def _send(self, one: Waits) -> None:
+        if one.unit is None:
+            await self._bench.send(one.line, one.text.encode("latin-1"))
+        else:
+            await self._bench.type(one.unit, one.text)
+
+    def _see(self) -> None:
+        """Time may have gone on without a word, or a command may have come to wait while it was told to."""
+        if self._queue and self._sends_now() and self._sending is None:
+            self._sending = asyncio.create_task(self._out())
+
+    async def _out(self) -> None:
+        try:
+            while self._queue and self._sends_now():
+                one = self._first()
+                try:
+                    await self._send(one)
+                except REFUSED as error:
+                    self._live.put({"turneddown": f"{one.text}: {error}"})
+        finally:
+            self._sending = None
 
     def _put(self, line: str, unit: str | None, text: str) -> None:
         if len(self._queue) >= MOST:

@@ -16,6 +16,14 @@ class Word(NamedTuple):
     whole: bool  # a word of its own, with a space behind it: "move", not "W"
 
 
+def check_typed(text: str) -> str:
+    """`text`, if a command line can be it: printable ASCII. Raises ValueError."""
+    foreign = next((one for one in text if not " " <= one <= "~"), None)
+    if foreign is not None:
+        raise ValueError(f"{foreign!r} is on no line of these units: write printable ASCII")
+    return text
+
+
 def words(model: str) -> tuple[Word, ...]:
     """The words of `model`, the longest first, as the longest that fits counts. Raises CatalogueError."""
     found: dict[str, list[CommandHelp]] = {}

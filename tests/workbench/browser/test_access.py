@@ -145,7 +145,6 @@ def test_every_page_is_reached_and_left_by_the_keyboard_alone(window: Window) ->
         assert len(set(seen)) > 6, f"{path}: the focus stands still: {seen}"
 
 
-@pytest.mark.slow  # F9 twice in a moment is now and then taken for once: to be mended
 @pytest.mark.parametrize("key", ["F8", "F9", "F10", "F4"])
 def test_the_keys_of_the_debugger_act_wherever_the_focus_is(window: Window, key: str) -> None:
     window.page.get_by_role("link", name="Program", exact=True).click()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests.workbench.browser.windows import LOOKS, PHONE, Served, Window, Windows, begun
+from tests.workbench.patience import PATIENCE
 
 HOMING = Path(__file__).parents[3] / "examples" / "homing" / "cell.toml"
 SMALL = """() => [...document.querySelectorAll('button, a, select, input')]
@@ -81,7 +82,7 @@ def test_the_tour_is_shown_once_and_again_when_it_is_asked_for(windows: Windows,
 def ask(url: str, *lines: str) -> str:
     """The first line of the answer to a request that no browser would send."""
     host, port = url.split("/")[2].split(":")
-    with socket.create_connection((host, int(port)), timeout=60) as connection:
+    with socket.create_connection((host, int(port)), timeout=PATIENCE) as connection:
         connection.sendall("\r\n".join([*lines, "", ""]).encode())
         return connection.makefile("rb").readline().decode()
 

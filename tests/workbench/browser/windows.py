@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tests.workbench.patience import PATIENCE
+
 COMMAND = [sys.executable, "-c", "from detent.cli import main; main()", "workbench"]
 WIDE, PHONE = (1280, 800), (390, 844)
 THEMES = ("light", "dark")
@@ -44,7 +46,7 @@ def served(place: Path, *arguments: str) -> Iterator[Served]:
     finally:
         process.terminate()
         try:
-            _, err = process.communicate(timeout=60)
+            _, err = process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
             raise
@@ -151,6 +153,7 @@ class Windows:
                 viewport={"width": size[0], "height": size[1]}, color_scheme=theme, has_touch=phone, is_mobile=phone,
                 permissions=["clipboard-read", "clipboard-write"],
             )  # fmt: skip
+            self._profiles[kind].set_default_timeout(1000 * PATIENCE)
             if not tour:
                 self._profiles[kind].add_init_script("localStorage.setItem('detent.tour', 'seen')")
         return self._profiles[kind]

@@ -1,6 +1,6 @@
 // The moving parts of the page Cell: dials, slides with their switches, inputs under a hand, command lines.
 
-const { part, on, get, action, call, toast, onTheme, theme, grouped } = window.detent;
+const { part, on, get, action, meant, underWay, make, call, toast, onTheme, theme, grouped } = window.detent;
 
 // -- dials ----------------------------------------------------------------------------------------------
 
@@ -114,9 +114,12 @@ part("slide", (box) => {
   }
 
   function moved(name, by) {
-    const [from, to] = [get(`s.${name}.low`), get(`s.${name}.high`)];
+    const [from, to] = [meant(`s.${name}.low`), meant(`s.${name}.high`)];
     return [from === null ? null : round(from + by), to === null ? null : round(to + by)];
   }
+
+  const put = (name, from, to) =>
+    make(`s.${name}.low`, from, () => make(`s.${name}.high`, to, () => action("place_switch", name, from, to)));
 
   for (const name of facts.switches) {
     const flag = document.createElement("button");
@@ -133,7 +136,7 @@ part("slide", (box) => {
       flag.focus({ preventScroll: true });
       flag.setPointerCapture(event.pointerId);
       grabbed = at(event.clientX - box.getBoundingClientRect().left);
-      held = [name, get(`s.${name}.low`), get(`s.${name}.high`)];
+      held = [name, meant(`s.${name}.low`), meant(`s.${name}.high`)];
     });
     flag.addEventListener("pointermove", (event) => {
       if (!held || held[0] !== name) return;
@@ -143,9 +146,9 @@ part("slide", (box) => {
     });
     const drop = async () => {
       if (!held || held[0] !== name) return;
-      const put = held;
-      if (put[1] !== get(`s.${name}.low`) || put[2] !== get(`s.${name}.high`)) await action("place_switch", ...put);
-      held = null;
+      const mine = held;
+      if (mine[1] !== meant(`s.${name}.low`) || mine[2] !== meant(`s.${name}.high`)) await put(...mine);
+      if (held === mine) held = null; // else it is under a hand again
       plan();
     };
     flag.addEventListener("pointerup", drop);
@@ -157,7 +160,7 @@ part("slide", (box) => {
       const by = { ArrowLeft: -1, ArrowRight: 1, PageDown: -10, PageUp: 10 }[event.key];
       if (!by) return;
       event.preventDefault();
-      action("place_switch", name, ...moved(name, by * (facts.whole ? 1 : (high - low) / 1000)));
+      put(name, ...moved(name, by * (facts.whole ? 1 : (high - low) / 1000)));
     });
   }
 
@@ -182,12 +185,15 @@ part("slide", (box) => {
 
 part("input-pin", (button) => {
   const { unit, pin } = button.dataset;
-  const held = () => (get(`u.${unit}.hand`) || []).includes(pin);
-  button.addEventListener("click", () => {
-    const level = get(`u.${unit}.pin.${pin}`);
-    action("set_pin", unit, pin, held() ? null : level ? 0 : 1);
-  });
   const key = `u.${unit}.hand`;
+  const mine = `${key}.${pin}`;
+  const held = () => (get(key) || []).includes(pin);
+  let other = 0; // the level that a hand gives it
+  button.addEventListener("click", () => {
+    if (!underWay(mine) && !held()) other = get(`u.${unit}.pin.${pin}`) ? 0 : 1;
+    const hold = !meant(mine, held());
+    make(mine, hold, () => action("set_pin", unit, pin, hold ? other : null));
+  });
   return on(key, (changed) => {
     if (changed !== key) return;
     button.classList.toggle("held", held());
@@ -238,13 +244,14 @@ part("command", (form) => {
     event.preventDefault();
     const text = field.value;
     if (!text) return;
+    past.push(text);
+    shown = past.length;
+    field.value = ""; // at once: what is typed next is the next command
     try {
       await call("type", form.dataset.unit, text);
-      past.push(text);
-      shown = past.length;
-      field.value = "";
     } catch (error) {
       toast(error.message, "error");
+      if (!field.value) field.value = text; // to be mended
     }
   });
   field.addEventListener("keydown", (event) => {

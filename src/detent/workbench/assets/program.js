@@ -17,6 +17,8 @@ class Program {
     this.checked = null;
     this.different = []; // lines that memory has otherwise
     this.ends = [];
+    this.showing = 0; // counts the units that were asked for: the last one counts
+    this.shown = Promise.resolve(); // the one that is asked for stands there
     this.seen = ""; // of what the running line was shown for
     const find = (selector) => root.querySelector(selector);
     this.at = {
@@ -30,44 +32,52 @@ class Program {
       dialog: find("dialog"),
     };
     for (const tab of root.querySelectorAll("[data-unit]"))
-      tab.addEventListener("click", () => this.show(tab.dataset.unit));
+      tab.addEventListener("click", () => this.turnTo(tab.dataset.unit));
     for (const key of root.querySelectorAll("[data-key]"))
-      key.addEventListener("click", () => this.actions[key.dataset.key]());
+      key.addEventListener("click", () => this.press(() => this.actions[key.dataset.key]()));
     find("[value=cancel]").addEventListener("click", () => this.at.dialog.close());
   }
 
   async open() {
     this.editor = await makeEditor(this.root.querySelector(".program-editor"), {
       changed: (typed) => this.changed(typed),
-      breakpoints: (lines) => this.setBreakpoints(lines),
-      moved: () => {},
-      placed: (line) => this.placed(line),
+      toggled: (line) => this.press(() => this.toggleBreakpoint(line)),
       keys: {
-        "Mod-s": () => this.actions.save(),
-        "Mod-Enter": () => (this.facts.language ? this.actions.run() : this.actions.send()),
-        F8: () => this.actions.go(),
-        F9: () => this.actions.break(),
-        F10: () => this.actions.step(),
-        "Shift-F10": () => this.actions.back(),
-        F4: () => this.actions.cursor(),
+        "Mod-s": () => this.press(() => this.actions.save()),
+        "Mod-Enter": () => this.press(() => (this.facts.language ? this.actions.run() : this.actions.send())),
+        F8: () => detent.turnTime(),
+        F9: () => this.press(() => this.actions.break()),
+        F10: () => this.press(() => this.actions.step()),
+        "Shift-F10": () => this.press(() => this.actions.back()),
+        F4: () => this.press(() => this.actions.cursor()),
       },
     });
     const units = [...this.root.querySelectorAll("[data-unit]")].map((tab) => tab.dataset.unit);
     const last = detent.remembered("program.unit");
     this.ends.push(detent.frame(() => this.look()), this.listenForKeys());
-    if (units.length) await this.show(units.includes(last) ? last : units[0]);
+    if (units.length) this.turnTo(units.includes(last) ? last : units[0]);
+  }
+
+  turnTo(unit) {
+    this.shown = this.show(unit);
+  }
+
+  /* A key was pressed: it acts on the unit that is asked for, once that is there. */
+  async press(action) {
+    await this.shown;
+    if (this.facts && !this.closed) await action();
   }
 
   /* The keys of the page, wherever the focus is; in the editor they are its own. */
   listenForKeys() {
     const pressed = (event) => {
-      if (event.defaultPrevented || event.altKey || !this.facts || this.at.dialog.open) return;
+      if (event.defaultPrevented || event.altKey || this.at.dialog.open) return;
       if (event.target.closest && event.target.closest("[role=dialog]")) return;
       const control = event.ctrlKey || event.metaKey;
       const name = control && event.key.toLowerCase() === "s" ? "save" : control ? null : KEYS[(event.shiftKey ? "Shift-" : "") + event.key];
       if (!name) return;
       event.preventDefault();
-      if (!event.repeat || name === "step" || name === "back") this.actions[name]();
+      if (!event.repeat || name === "step" || name === "back") this.press(() => this.actions[name]());
     };
     document.addEventListener("keydown", pressed);
     return () => document.removeEventListener("keydown", pressed);
@@ -83,12 +93,15 @@ class Program {
   /* -- the unit and its text -------------------------------------------------------------------------------- */
 
   async show(unit) {
-    this.flush();
+    const mine = (this.showing += 1);
+    delete this.root.dataset.checked;
     const facts = await this.ask("program_about", unit);
-    if (!facts || this.closed) return;
+    if (!facts || this.closed || mine !== this.showing) return;
     facts.draft = facts.language ? unit : `script.${facts.line}`; // a script is that of the Terminal page
+    this.flush(); // what was typed so far is of the unit before, whose draft it is
     const draft = await this.ask("draft", facts.draft);
-    if (this.closed) return;
+    if (this.closed || mine !== this.showing) return;
+    this.flush();
     this.facts = facts;
     detent.remember("program.unit", unit);
     for (const tab of this.root.querySelectorAll("[data-unit]"))
@@ -211,7 +224,7 @@ class Program {
     const held = detent.get("held"),
       address = get("address"),
       memory = get("memory"),
-      breaks = JSON.stringify(get("breaks") || []);
+      breaks = JSON.stringify(detent.meant(this.breaksKey) || []);
     const go = this.root.querySelector("[data-key=go] span"),
       word = held ? "Go" : "Pause";
     if (go.textContent !== word) go.textContent = word;
@@ -267,9 +280,9 @@ class Program {
     );
   }
 
-  /* Show the breakpoints that the cell has. */
+  /* Show the breakpoints that the cell has, or will have when what was asked for is done. */
   takeBreakpoints() {
-    const addresses = detent.get(`u.${this.facts.unit}.breaks`) || [];
+    const addresses = detent.meant(this.breaksKey) || [];
     this.breaks = JSON.stringify(addresses);
     this.ahead = false;
     this.editor.breakAt(
@@ -280,12 +293,35 @@ class Program {
     );
   }
 
+  get breaksKey() {
+    return `u.${this.facts.unit}.breaks`;
+  }
+
+  /* Somebody wants a breakpoint at a line, or its instruction, or none where one is. */
+  toggleBreakpoint(line) {
+    if (!this.facts.language) return;
+    const place = this.placed(line),
+      { breakLines } = this.editor;
+    if (!this.checked || !this.checked.loaded || place === undefined) {
+      const at = breakLines.includes(place) ? place : line;
+      this.setBreakpoints(breakLines.includes(at) ? breakLines.filter((other) => other !== at) : [...breakLines, at]);
+      return;
+    }
+    const { unit } = this.facts,
+      address = this.addresses.get(place),
+      before = detent.meant(this.breaksKey) || [],
+      on = !before.includes(address),
+      after = on ? [...before, address].sort((a, b) => a - b) : before.filter((other) => other !== address);
+    detent.make(this.breaksKey, after, () => this.ask("program_breakpoint", unit, address, on));
+    this.takeBreakpoints();
+  }
+
   /* The line of the instruction at this line, or of the next one behind it. */
   placed(line) {
     return this.addresses && [...this.addresses.keys()].sort((a, b) => a - b).find((place) => place >= line);
   }
 
-  /* Somebody has set or removed a breakpoint: those on no instruction go to the next one. */
+  /* These lines, and no others, have breakpoints from now on: those on no instruction go to the next one. */
   setBreakpoints(lines) {
     if (!this.checked || !this.facts.language) {
       this.editor.breakAt([]);
@@ -295,12 +331,12 @@ class Program {
     this.editor.breakAt(moved);
     this.ahead = !this.checked.loaded; // set in a text that is not loaded yet
     if (this.ahead) this.say("Breakpoints are in force once this text is loaded.");
-    else
-      this.ask(
-        "program_breaks",
-        this.facts.unit,
-        moved.map((line) => this.addresses.get(line)),
-      );
+    else {
+      const addresses = moved.map((line) => this.addresses.get(line)).sort((a, b) => a - b),
+        { unit } = this.facts;
+      detent.make(this.breaksKey, addresses, () => this.ask("program_breaks", unit, addresses));
+      this.takeBreakpoints();
+    }
   }
 
   /* -- what the keys do ------------------------------------------------------------------------------------------- */
@@ -348,7 +384,7 @@ class Program {
         this.chooseFile("Open", "Open", async (name) => {
           const text = await this.ask("read_file", name);
           if (text === undefined) return false;
-          this.file = name;
+          if (this.facts !== facts) return true;
           this.saved = text;
           this.replace(text, name);
           return true;
@@ -359,15 +395,16 @@ class Program {
             told = await this.ask("write_file", name, text, name === this.file ? this.saved : null, over);
           if (told === undefined) return false;
           if (told.asks) return told.asks;
+          detent.toast(`Saved: ${told.saved}`);
+          if (this.facts !== facts) return true; // another unit is shown by now
           this.file = name;
           this.saved = text;
           this.unkept = facts.draft;
           this.flush();
           this.name();
-          detent.toast(`Saved: ${told.saved}`);
           return true;
         }),
-      go: () => this.ask(detent.get("held") ? "go" : "hold"),
+      go: () => detent.turnTime(),
       step: () => this.ask("step_instruction", unit),
       back: () => this.ask("step_back", unit),
       cursor: () => {
@@ -377,8 +414,11 @@ class Program {
         else if (!this.checked.loaded) detent.toast("Load the program first.", "error");
         else this.ask("program_run_to", unit, this.addresses.get(place));
       },
-      break: () => editor.toggleBreakpoint(),
-      errors: () => this.ask("break_on_errors", !detent.get("breakerrors")),
+      break: () => this.toggleBreakpoint(editor.line),
+      errors: () => {
+        const on = !detent.meant("breakerrors");
+        return detent.make("breakerrors", on, () => this.ask("break_on_errors", on));
+      },
       send: () => this.ask("run_script", facts.line, unit, editor.text),
       "send-line": () => this.ask("run_script", facts.line, unit, editor.text.split("\n")[editor.line - 1]),
       stop: () => this.ask("stop_script", facts.line),
@@ -430,12 +470,18 @@ class Program {
         return item;
       }),
     );
+    const mine = (this.choosing = {});
+    let under = false; // one at a time
     form.onsubmit = async (event) => {
       event.preventDefault();
-      if (!name.value) return;
-      const done = await action(name.value, over === name.value);
+      const asked = name.value;
+      if (!asked || under) return;
+      under = true;
+      const done = await action(asked, over === asked).finally(() => (under = false));
+      if (this.choosing !== mine) return; // the dialog was opened for something else meanwhile
       if (typeof done === "string") {
-        over = name.value;
+        if (name.value !== asked) return; // the question is about another file by now
+        over = asked;
         asks.textContent = done;
         submit.textContent = "Replace";
         submit.focus();

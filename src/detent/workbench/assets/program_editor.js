@@ -3,7 +3,7 @@
 
 let CM = null;
 
-/* The editor in `place`. `told` has changed(text), breakpoints(lines), runTo(line), keys {key: action}. */
+/* The editor in `place`. `told` has changed(typed), toggled(line), keys {key: action}. */
 export async function makeEditor(place, told) {
   await prepare();
   return new Editor(place, told);
@@ -135,18 +135,11 @@ class Editor {
     this.language = new CM.Compartment();
     const data = [{ autocomplete: (context) => this.complete(context) }]; // one and the same: a new one begins anew
     const toggle = (view, line) => {
-      const at = view.state.doc.lineAt(line.from).number,
-        lines = this.breakLines;
-      const place = this.told.placed(at); // a line without an instruction stands for the next one
-      const next = lines.includes(place) ? lines.filter((other) => other !== place) : lines.includes(at) ? lines.filter((other) => other !== at) : [...lines, at];
-      this.breakAt(next);
-      this.told.breakpoints(next);
+      this.told.toggled(view.state.doc.lineAt(line.from).number);
       return true;
     };
-    this.toggleBreakpoint = () => toggle(this.view, this.view.state.doc.line(this.line));
     const changes = CM.EditorView.updateListener.of((update) => {
       if (update.docChanged) this.told.changed(!this.quiet);
-      if (update.selectionSet || update.docChanged) this.told.moved && this.told.moved();
     });
     const actions = Object.entries(this.told.keys || {}).map(([key, action]) => ({
       key,

@@ -286,10 +286,13 @@ part("terminal", (box) => {
     keep();
   });
   script.addEventListener("scroll", () => (numbers.scrollTop = script.scrollTop));
+  let starting = false;
   role("run").addEventListener("click", async () => {
+    if (starting) return; // once more would begin it anew
+    starting = true;
     const unit = to.value === RAW ? facts[line].units[0] : to.value;
     try {
-      await call("run_script", line, unit, script.value);
+      await call("run_script", line, unit, script.value).finally(() => (starting = false));
     } catch (error) {
       role("told").textContent = error.message;
       role("told").classList.add("bad");
@@ -301,9 +304,20 @@ part("terminal", (box) => {
     const files = await call("files", [".txt", ".script"]).catch(() => []);
     box.querySelector("#scripts").replaceChildren(...files.map((name) => new Option(name)));
   });
+  let opened = ""; // the text of the file, as it was opened or saved
   role("open").addEventListener("click", async () => {
+    const before = script.value;
+    const sure = role("open").textContent === "Replace";
+    role("open").textContent = "Open";
+    if (before.trim() && before !== opened && !sure) {
+      role("open").textContent = "Replace";
+      toast("The script that is written here is in no file: click once more to replace it.", "error");
+      return;
+    }
     try {
-      script.value = await call("read_file", role("file").value);
+      const text = await call("read_file", role("file").value);
+      if (script.value !== before) throw new Error("the script was changed meanwhile, so the file was not opened");
+      script.value = opened = text;
       renumber();
       keep();
     } catch (error) {
@@ -313,8 +327,10 @@ part("terminal", (box) => {
   role("save").addEventListener("click", async () => {
     try {
       const name = role("file").value;
-      const told = await call("write_file", name, script.value, null, over === name);
+      const text = script.value;
+      const told = await call("write_file", name, text, null, over === name);
       over = told.asks ? name : "";
+      if (told.saved) opened = text;
       role("save").textContent = over ? "Replace" : "Save";
       toast(told.asks || `Saved: ${told.saved}`, told.asks ? "error" : "note");
       if (told.saved) keep();
@@ -326,6 +342,7 @@ part("terminal", (box) => {
   role("file").addEventListener("input", () => {
     over = "";
     role("save").textContent = "Save";
+    role("open").textContent = "Open";
   });
 
   role("hex").addEventListener("click", () => {

@@ -1,6 +1,6 @@
 // The time line: everything that is kept of the cell's past, with its marks. Dragging takes the cell there.
 
-const { part, on, frame, call, toast, seconds, get } = window.detent;
+const { part, on, frame, call, toast, seconds, get, turnTime } = window.detent;
 
 const COLOURS = { error: "#ff6b5e", caution: "#ffd84d", power: "#ffb02e", action: "#7fe3d0", breakpoint: "#ff8ad0", stored: "#8fb8ff" };
 const LEFT = 10; // px of air at both ends
@@ -183,7 +183,7 @@ part("timeline", (box) => {
     const coarse = (end() - begin()) / 100;
     const far = { ArrowLeft: -coarse, ArrowRight: coarse, PageUp: -10 * coarse, PageDown: 10 * coarse }[event.key];
     let aim = null;
-    if (far) aim = (get("now") || 0) + far;
+    if (far) aim = (wanted ?? get("now") ?? 0) + far;
     else if (event.key === "Home") aim = begin();
     else if (event.key === "End") aim = end();
     if (aim === null) return;
@@ -253,8 +253,4 @@ part("futures", (dialog) => {
   });
 });
 
-part("go", (button) => {
-  button.addEventListener("click", () => {
-    call(get("held") ? "go" : "hold").catch((error) => toast(error.message, "error"));
-  });
-});
+part("go", (button) => button.addEventListener("click", turnTime));

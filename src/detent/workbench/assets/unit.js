@@ -1,6 +1,6 @@
 // The page Unit: the unit that is chosen, filled into the markup of detent/workbench/pages/unit.py.
 
-const { part, on, get, call, toast, remembered, remember, seconds, grouped } = window.detent;
+const { part, on, get, call, meant, make, toast, remembered, remember, seconds, grouped } = window.detent;
 
 const MOST = 800; // rows on the page
 const HELD = 300; // ms between two words that a key is held
@@ -174,8 +174,7 @@ part("unit", (box) => {
         return [element("dt", "", name), words];
       }));
     }
-    const paused = role("pause");
-    paused.setAttribute("aria-pressed", told.paused ? "true" : "false");
+    role("pause").setAttribute("aria-pressed", told.paused ? "true" : "false");
     if (document.activeElement !== role("rates")) role("rates").value = String(told.asking);
     role("took").textContent = told.lost ? "not asked: the port is gone" : told.paused ? "not asked: what is shown is what it told last"
       : told.trouble ? "asked less often while it does not answer" : `asked ${told.asking}\u00d7 a second; ${Math.round(told.took * 1000)} ms each`;
@@ -196,9 +195,10 @@ part("unit", (box) => {
 
   role("again").addEventListener("click", () => tried(() => call("unit_again", chosen)));
   role("leave").addEventListener("click", () => tried(() => call("unit_leave", chosen)));
-  const ask = (paused) => tried(() => call("unit_asking", chosen, paused, Number(role("rates").value)));
-  role("pause").addEventListener("click", () => ask(!now().paused));
-  role("rates").addEventListener("change", () => ask(now().paused));
+  const paused = () => meant(`r.${chosen}.paused`, now().paused);
+  const ask = (pause) => make(`r.${chosen}.paused`, pause, () => tried(() => call("unit_asking", chosen, pause, Number(role("rates").value))));
+  role("pause").addEventListener("click", () => ask(!paused()));
+  role("rates").addEventListener("change", () => ask(paused()));
 
   // -- hands --
 
@@ -428,8 +428,13 @@ part("unit", (box) => {
 
   role("read").addEventListener("click", async () => {
     const read = async () => {
+      const before = source();
       const text = await tried(() => call("unit_source", chosen));
       if (text === undefined) return;
+      if (source() !== before) {
+        tell("The text here was changed meanwhile, so it was not replaced by the program of the unit.");
+        return;
+      }
       role("source").value = text;
       tell(text.trim() ? "read from the unit" : "the unit holds no program");
     };

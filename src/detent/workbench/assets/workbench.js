@@ -8,6 +8,7 @@ const frames = new Set();
 const parts = new Map(); // name -> setup
 const living = new Map(); // element with data-part -> what ends it
 const waiting = new Map(); // number of a call -> [resolve, reject]
+const meanings = new Map(); // key -> [what calls under way make of it, how many those are]
 const opening = []; // what is called when there is a connection
 const PATIENCE = 8000; // ms that a call waits for one
 let socket = null;
@@ -44,7 +45,11 @@ function connect() {
 }
 
 /** Make a call; it waits a while for the connection, if there is none. */
-async function call(name, ...args) {
+function call(name, ...args) {
+  return name in STANDS ? make("held", STANDS[name], () => say(name, args)) : say(name, args);
+}
+
+async function say(name, args) {
   if (!socket || socket.readyState !== WebSocket.OPEN) await connected();
   return new Promise((resolve, reject) => {
     calls += 1;
@@ -62,6 +67,37 @@ function connected() {
     });
   });
 }
+
+// -- what is meant -----------------------------------------------------------------------------------------
+// The table is a moment behind what was clicked. Whoever turns something over asks what it is meant to be: then the
+// second of two quick clicks takes the first one back, and none is lost.
+
+const STANDS = { hold: true, go: false, step_event: true, step_back: true, step_instruction: true, rewind: true, program_run_to: false };
+
+/** What `key` is once all calls under way are done; if none is, what it is (`now`, or as the table says). */
+function meant(key, now = values.get(key)) {
+  return meanings.has(key) ? meanings.get(key)[0] : now;
+}
+
+/** Whether calls are under way that make something else of `key`. */
+const underWay = (key) => meanings.has(key);
+
+/** Make the calls of `going`, which are to make `value` of `key`. The table has it before they are answered. */
+async function make(key, value, going) {
+  const one = meanings.get(key) || [value, 0];
+  one[0] = value;
+  one[1] += 1;
+  meanings.set(key, one);
+  try {
+    return await going();
+  } finally {
+    one[1] -= 1;
+    if (!one[1]) meanings.delete(key);
+  }
+}
+
+/** Time stands if it goes, and goes if it stands. */
+const turnTime = () => action(meant("held") ? "go" : "hold");
 
 /** The same for a hand at the page: an error is shown, and nothing is thrown. */
 async function action(name, ...args) {
@@ -282,7 +318,7 @@ function toast(text, kind = "note") {
 
 function argument(written) {
   if (typeof written !== "string") return written;
-  if (written.startsWith("!")) return values.get(written.slice(1)) ? 0 : 1;
+  if (written.startsWith("!")) return meant(written.slice(1)) ? 0 : 1;
   if (written.startsWith("=")) return values.get(written.slice(1));
   return written;
 }
@@ -291,7 +327,11 @@ function listenForActions() {
   document.addEventListener("click", (event) => {
     const element = event.target.closest("[data-do]");
     if (!element || element.disabled) return;
-    action(element.dataset.do, ...JSON.parse(element.dataset.args || "[]").map(argument));
+    const written = JSON.parse(element.dataset.args || "[]");
+    const args = written.map(argument);
+    const turned = written.findIndex((one) => typeof one === "string" && one.startsWith("!"));
+    if (turned < 0) action(element.dataset.do, ...args);
+    else make(written[turned].slice(1), args[turned], () => action(element.dataset.do, ...args));
   });
   document.addEventListener("click", (event) => {
     // a pointer does not leave the focus at a button or tab, where the next space would press it once more
@@ -300,7 +340,7 @@ function listenForActions() {
   document.addEventListener("keydown", (event) => {
     if (event.key !== "F8" || event.defaultPrevented || event.ctrlKey || event.altKey || event.shiftKey) return;
     event.preventDefault(); // wherever the focus is
-    if (!event.repeat) action(values.get("held") ? "go" : "hold");
+    if (!event.repeat) turnTime();
   });
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -310,7 +350,7 @@ function listenForActions() {
     if (event.key === " ") {
       if (at.closest("button, a, summary")) return; // it is theirs
       event.preventDefault();
-      action(values.get("held") ? "go" : "hold");
+      turnTime();
     } else if (event.key in keys) {
       event.preventDefault();
       if (!event.repeat || event.key === "." || event.key === ",") action(keys[event.key]);
@@ -425,7 +465,7 @@ function followTabs() {
 }
 
 window.detent = {
-  part, on, frame, call, action, toast, onTheme, theme, remembered, remember, seconds, grouped,
+  part, on, frame, call, action, meant, underWay, make, turnTime, turning: () => meanings.size > 0, toast, onTheme, theme, remembered, remember, seconds, grouped,
   get: (key) => values.get(key),
   keys: () => values.keys(),
   forms: FORMS,
@@ -440,6 +480,7 @@ followTabs();
 on("real", (key, value) => {
   if (key === "real") document.documentElement.dataset.real = value ?? "";
 });
+on("turneddown", (key, value) => toast(value, "error")); // a command that had waited
 on("crashed", (key, value) => (document.documentElement.dataset.crashed = value ? "yes" : ""));
 on("title", (key, value) => {
   document.documentElement.dataset.title = value;

@@ -46,6 +46,7 @@ class Units:
         """Backups are read and written in `folder`; what a restore replaces is kept below `state`."""
         self._live, self._stopping, self._folder, self._state = live, stopping, folder, state
         self._units: dict[str, Unit] = {}
+        self._turning = asyncio.Lock()  # the last word counts, not the last to be done
         live.put({"r.names": []})
         for call in (self.unit_connect, self.unit_again, self.unit_leave, self.unit_say, self.unit_both, self.unit_move,
                      self.unit_hold, self.unit_held, self.unit_stop, self.unit_asking, self.unit_talk, self.unit_source,
@@ -189,9 +190,10 @@ class Units:
         """Ask no more, or again, so many times a second."""
         unit = self._unit(name)
         unit.rate = min(RATES, key=lambda one: abs(one - rate))
-        if unit.paused and not paused:
-            await unit.connect()
-        unit.paused = paused
+        async with self._turning:
+            if unit.paused and not paused:
+                await unit.connect()
+            unit.paused = paused
         self._tell(unit)
 
     # -- its program -------------------------------------------------------------------------------------
