@@ -82,7 +82,7 @@ def test_a_cell_runs_with_its_script_and_its_units_can_be_told_apart(capsys: pyt
 def test_an_endless_program_is_stopped_and_said_to_be_endless(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("detent.cli.run.MOST_INSTANTS", 1000)
+    monkeypatch.setattr("detent.cli.sending.MOST_INSTANTS", 1000)
     program = tmp_path / "endless.gsc"
     program.write_text("again: A1\n C1\n j again\n")
     assert detent("run", "gs-c200s", "--program", str(program)) == 0
@@ -205,7 +205,7 @@ def test_a_motor_that_breaks_the_equations_ends_in_one_line(
 
     monkeypatch.setattr("detent.cli.exports.write", breaks)
     assert detent("run", "gs-c200", "--plot", str(tmp_path / "a.png")) == 1
-    monkeypatch.setattr("detent.cli.run._Course.run", breaks)
+    monkeypatch.setattr("detent.cli.sending.Course.run", breaks)
     assert detent("run", "gs-c200") == 1
     assert capsys.readouterr().err.splitlines() == ["detent: the rotor runs away"] * 2
 

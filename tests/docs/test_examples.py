@@ -44,7 +44,7 @@ def positions(cell: Cell) -> dict[str, int]:
 
 def pulses(cell: Cell, unit: str) -> list[Ns]:
     """The times of all pulses of a unit."""
-    return seen(cell, unit).pulses(0, cell.now + 1).times.tolist()
+    return seen(cell, unit).motion.pulses(0, cell.now + 1).times.tolist()
 
 
 def test_no_example_is_without_a_test() -> None:
@@ -103,12 +103,12 @@ def test_a_module_without_host_homes_and_runs_its_stored_program() -> None:
     slide = seen(cell, "slide")
     up, back = 300 - 120, 300
     homed = pulses(cell, "slide")[up + back - 1]
-    assert slide.position(homed) == 0
+    assert slide.motion.position(homed) == 0
     intervals = {b - a for a, b in pairwise(pulses(cell, "slide")[:up])}
     assert intervals == {SECOND // 200}  # S20, the first S of the program
     # G+2: 250 pulses until the sensor, one that keeps its time, then a ramp of 60; and the same way back
     assert len(pulses(cell, "slide")) == up + back + 2 * (250 + 1 + 60)
-    assert slide.position(pulses(cell, "slide")[up + back + 311 - 1]) == 311
+    assert slide.motion.position(pulses(cell, "slide")[up + back + 311 - 1]) == 311
 
 
 def test_buttons_choose_what_is_executed() -> None:
@@ -127,10 +127,10 @@ def test_the_belt_stops_one_ramp_behind_each_mark() -> None:
     belt = seen(cell, "belt")
     for mark in (1.0, 2.5, 4.0):
         at = round(mark * SECOND)
-        stopped = belt.position(at + 150 * MS)
-        assert stopped == belt.position(at + 200 * MS)
-        assert stopped - belt.position(at) == 1 + 40  # the pulse that keeps its time, and R
-    assert positions(cell) == {"belt": belt.position(cell.now)}
+        stopped = belt.motion.position(at + 150 * MS)
+        assert stopped == belt.motion.position(at + 200 * MS)
+        assert stopped - belt.motion.position(at) == 1 + 40  # the pulse that keeps its time, and R
+    assert positions(cell) == {"belt": belt.motion.position(cell.now)}
 
 
 def test_the_sin_10_moves_three_axes_by_one_line_and_reads_where_they_are() -> None:
@@ -159,7 +159,7 @@ class TestAssembly:
 
     def test_the_bearing_goes_on_a_straight_line_beside_which_no_axis_is_by_a_step(self, assembled: Cell) -> None:
         axes = [seen(assembled, f"left-{axis}") for axis in "xyz"]
-        x, y, z = (axis.pulses(0, assembled.now + 1) for axis in axes)
+        x, y, z = (axis.motion.pulses(0, assembled.now + 1) for axis in axes)
         origin = 1  # the half step at which the switches open
         begin = int(x.times[x.positions == origin + 6000 - 1][-1])  # the first pulse of the line, from 6000 to 5400
         end = int(x.times[x.positions == origin + 5400][-1])

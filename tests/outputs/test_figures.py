@@ -58,7 +58,7 @@ def test_many_steps_are_drawn_at_the_ends_of_motions_and_at_every_column():
     unit = signals.unit("bar")
     trace = curves.position_trace(unit, signals.until, COLUMNS)
     assert len(trace.times) < 2 * COLUMNS
-    assert trace.values.tolist() == [unit.position(t) for t in trace.times.tolist()]
+    assert trace.values.tolist() == [unit.motion.position(t) for t in trace.times.tolist()]
 
 
 def test_moves_within_a_column_show_how_far_they_went():
@@ -73,7 +73,7 @@ def test_speeds_follow_the_law_and_not_the_rounded_times():
     signals = drilled()
     unit = signals.unit("bar")
     trace = curves.speed_trace(unit, signals.until, COLUMNS)
-    [span] = unit.spans
+    [span] = unit.motion.spans
     for n in (1, 20, 49, 51, 150, 249, 251, 299):
         t = span.train.time_of(n)
         assert at(trace, t) == pytest.approx(span.train.state_at(t).rate, rel=1e-6)

@@ -41,9 +41,9 @@ def test_cut_replanned_and_unpowered_motion_gives_the_pulses_that_were_given():
     expected = level_changes(recording, DRILL, until)
     for pin, wanted in expected.items():
         assert changes(signals, "drill", pin) == wanted, pin
-    found = signals.unit("drill").pulses(0, until + 1)
+    found = signals.unit("drill").motion.pulses(0, until + 1)
     assert list(zip(*(column.tolist() for column in found), strict=True)) == pulses(recording, "drill", until)
-    assert signals.unit("drill").pulse_count == 670
+    assert signals.unit("drill").motion.pulse_count == 670
 
 
 @given(st.integers(1, 40), st.integers(0, 2_100_000_000))
@@ -59,7 +59,7 @@ def test_windows_of_any_size_join_to_the_same_waves(limit, until):
     whole = unit.wave("CLOCK")
     assert np.concatenate([piece.times for piece in pieces]).tolist() == whole.times.tolist()
     assert np.concatenate([piece.levels for piece in pieces]).tolist() == whole.levels.tolist()
-    assert all(len(unit.pulses(begin, end).times) <= limit for begin, end in windows)
+    assert all(len(unit.motion.pulses(begin, end).times) <= limit for begin, end in windows)
 
 
 @given(st.integers(0, 2_100_000_000))
@@ -68,7 +68,7 @@ def test_a_run_that_is_looked_at_before_its_end_has_what_happened_until_then(unt
     signals = Signals(recording, [DRILL], until)
     assert changes(signals, "drill", "CLOCK") == level_changes(recording, DRILL, until)["CLOCK"]
     given_so_far = pulses(recording, "drill", until)
-    assert signals.unit("drill").position(until) == (given_so_far[-1][2] if given_so_far else 0)
+    assert signals.unit("drill").motion.position(until) == (given_so_far[-1][2] if given_so_far else 0)
 
 
 def test_pulses_that_touch_are_one_low_level():
@@ -109,14 +109,14 @@ def test_an_endless_motion_is_drawn_to_the_end_of_the_run():
     recording = Recording(["bar"])
     recording.extend(0, [Powered(0, True), MotionStarted(0, move(1000, 1000, 1, None).train, 1, -1, 7)])
     unit = Signals(recording, [BAR], 10 * MS).unit("bar")
-    assert unit.pulse_count == 10
-    assert unit.pulses(0, SECOND).positions.tolist() == [6, 5, 4, 3, 2, 1, 0, -1, -2, -3]
-    assert unit.start == 7
+    assert unit.motion.pulse_count == 10
+    assert unit.motion.pulses(0, SECOND).positions.tolist() == [6, 5, 4, 3, 2, 1, 0, -1, -2, -3]
+    assert unit.motion.start == 7
 
 
 def test_an_axis_that_does_not_move_stands_where_its_view_says():
     signals = Signals(Recording(["bar"]), [BAR._replace(shaft=40)], SECOND)
-    assert signals.unit("bar").start == signals.unit("bar").position(MS) == 40
+    assert signals.unit("bar").motion.start == signals.unit("bar").motion.position(MS) == 40
 
 
 def test_straps_appear_when_they_are_given_a_level_and_supply_pins_never():

@@ -53,12 +53,12 @@ def test_columns_of_a_position_hold_every_place_it_was_at(drilling: Told, begin:
         one = whole.unit(unit)
         for k in range(data.columns):
             first, last = data.begin + k * data.width, data.begin + (k + 1) * data.width
-            places = [one.position(first - 1), *one.pulses(first, last).positions.tolist()]
+            places = [one.motion.position(first - 1), *one.motion.pulses(first, last).positions.tolist()]
             low, high = min(places), max(places)
             assert low >= data.low[0, k] >= low - 1e-9
             assert high <= data.high[0, k] <= high + 1e-9
             if k % 20 == 0:
-                assert data.high[1, k] == len(one.pulses(0, last).times)
+                assert data.high[1, k] == len(one.motion.pulses(0, last).times)
 
 
 def test_columns_of_a_speed_reach_its_peaks(drilling: Told) -> None:
@@ -124,9 +124,9 @@ def test_what_is_forgotten_leaves_levels_and_places_as_they_were() -> None:
     pulses = [key for key in keys if key.endswith(".pulses")]
     assert all(told.scope.curve(k).value(12 * SECOND) == whole.scope.curve(k).value(12 * SECOND) for k in pulses)
     assert len(told.mirror.recording()) < len(whole.mirror.recording()) / 2
-    assert told.mirror.signals().unit(told.picture.units[next(iter(told.picture.units))].name).position(
+    assert told.mirror.signals().unit(told.picture.units[next(iter(told.picture.units))].name).motion.position(
         12 * SECOND
-    ) == whole.mirror.signals().unit(next(iter(whole.picture.units))).position(12 * SECOND)
+    ) == whole.mirror.signals().unit(next(iter(whole.picture.units))).motion.position(12 * SECOND)
 
 
 def test_triggers_are_found_at_their_very_nanosecond(drilling: Told) -> None:
@@ -137,7 +137,7 @@ def test_triggers_are_found_at_their_very_nanosecond(drilling: Told) -> None:
     assert search(Trigger("fall", "bar.UO2"), 1, 4 * SECOND, 100) == wave.times[wave.levels == 0].tolist()
     clock = whole.unit("bar").wave("CLOCK").between(SECOND, 1200 * MS)
     assert search(Trigger("edge", "bar.CLOCK"), SECOND, 1200 * MS - 1, 9999) == clock.times.tolist()
-    pulses = whole.unit("bar").pulses(0, 4 * SECOND)
+    pulses = whole.unit("bar").motion.pulses(0, 4 * SECOND)
     (at,) = search(Trigger("up", "bar.position", 250.5), 0, 4 * SECOND, 100)
     assert at == pulses.times[pulses.positions == 251][0]
     for at in search(Trigger("up", "drill.speed", 500.0), 0, 4 * SECOND, 100):

@@ -100,7 +100,7 @@ def _told(path: Path, size: int, signals: "Signals", *, compressed: bool = False
     from detent.hosts.exchange import Progress
 
     if size > LARGE:
-        pulses = sum(unit.pulse_count for unit in signals.units)
+        pulses = sum(unit.motion.pulse_count for unit in signals.units)
         what = f"about {show_size(size)}" + (" before it is compressed" if compressed else "")
         print(f"Writing {path}: {pulses} pulses, {what}; Ctrl-C leaves no part of it", file=sys.stderr, flush=True)
         folder = path.resolve().parent

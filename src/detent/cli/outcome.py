@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from detent.cell.cell import Cell
     from detent.cell.conversation import Conversation, Exchange
     from detent.cell.mechanics import Mechanics
-    from detent.cli.run import Line
+    from detent.cli.sending import Line
     from detent.controllers.device import Controller, Refused
     from detent.ticks import Ns
 
@@ -235,7 +235,7 @@ def warn(told: Outcome) -> None:
         lines = ", ".join(repr(line.text) for line in told.unsent[:MOST_SHOWN])
         _warn(f"the time of --for was over before these were sent: {lines}; give it more")
     if told.ended == "endless":
-        from detent.cli.run import MOST_INSTANTS
+        from detent.cli.sending import MOST_INSTANTS
 
         _warn(
             f"after {MOST_INSTANTS} events the program looks endless; say how long to run it: --for TIME, like --for 60"

@@ -33,7 +33,7 @@ BLOCK = 1 << 18  # pulses made at a time
 
 def size(signals: Signals) -> int:
     """About how many bytes there are before they are compressed."""
-    return sum(unit.pulse_count * (17 + 10 * len(unit.windings)) for unit in signals.units) + sum(
+    return sum(unit.motion.pulse_count * (17 + 10 * len(unit.windings)) for unit in signals.units) + sum(
         9 * len(unit.logged(pin).times) for unit in signals.units for pin in unit.pins
     )
 
@@ -48,11 +48,11 @@ def write(path: Path, signals: Signals, meta: Mapping[str, Any] | None = None, w
     with open_whole(path) as file, ZipFile(file, "w", ZIP_DEFLATED) as archive:
         archive.comment = MARK
         _put(archive, "meta", text.dtype, (), [text])
-        total, done = 3 * sum(unit.pulse_count for unit in signals.units), 0
+        total, done = 3 * sum(unit.motion.pulse_count for unit in signals.units), 0
         for unit in signals.units:
             _put_unit(archive, unit, lambda pulses, before=done: watch(before + pulses, total))  # type: ignore[misc]
             _put_windings(archive, unit, signals)
-            done += 3 * unit.pulse_count
+            done += 3 * unit.motion.pulse_count
 
 
 def _about(unit: UnitSignals) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def _about(unit: UnitSignals) -> dict[str, Any]:
     return {
         "pins": list(unit.pins),
         "windings": list(unit.windings),
-        "position_at_0": unit.start,
+        "position_at_0": unit.motion.start,
         "pulse_output": None
         if output is None
         else {
@@ -74,12 +74,12 @@ def _about(unit: UnitSignals) -> dict[str, Any]:
 
 def _put_unit(archive: ZipFile, unit: UnitSignals, told: Callable[[int], None]) -> None:
     """The arrays of a unit; `told` how many pulses are in them so far, each counted in the three that it is in."""
-    name, count, int64 = unit.name, (unit.pulse_count,), np.dtype(np.int64)
+    name, count, int64 = unit.name, (unit.motion.pulse_count,), np.dtype(np.int64)
     done = 0
 
     def blocks() -> Iterator[tuple[Span, int, int]]:
         nonlocal done
-        for span, first, last in _blocks(unit.spans):
+        for span, first, last in _blocks(unit.motion.spans):
             yield span, first, last
             done += last - first + 1
             told(done)

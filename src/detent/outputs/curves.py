@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from detent.cell.recording import Span
 from detent.controllers.device import Executing, Finished, Powered
-from detent.outputs.signals import Pulses, Signals, UnitSignals
+from detent.outputs.axis_motion import Pulses
+from detent.outputs.signals import Signals, UnitSignals
 from detent.outputs.waves import Levels, Wave
 from detent.outputs.windings import Driven
 from detent.pulses import Accelerating, Uniform
@@ -51,20 +52,20 @@ class Band(NamedTuple):
 
 def position_trace(unit: UnitSignals, until: Ns, columns: int) -> Trace:
     """The commanded position from 0 to `until`: a staircase if it has few steps."""
-    if unit.pulse_count <= EXACT:
-        pulses = unit.pulses(0, until + 1)
+    if unit.motion.pulse_count <= EXACT:
+        pulses = unit.motion.pulses(0, until + 1)
         times = np.concatenate(([0], np.repeat(pulses.times, 2), [until]))
-        levels = np.concatenate(([unit.start], pulses.positions)).astype(np.float64)
+        levels = np.concatenate(([unit.motion.start], pulses.positions)).astype(np.float64)
         return Trace(times, np.repeat(levels, 2))
     grid = {until * k // columns for k in range(columns + 1)}
     points: list[tuple[Ns, float]] = []
-    for group in _groups(unit.spans, until, columns):
+    for group in _groups(unit.motion.spans, until, columns):
         if len(group) == 1:
             grid |= {group[0].begins, group[0].ends}
             continue
         ends = [span.shaft + span.direction * n for span in group for n in (span.first - 1, span.last)]
         points += [(group[0].begins, min(ends)), (group[0].begins, max(ends))]
-    points += [(t, unit.position(t)) for t in grid]
+    points += [(t, unit.motion.position(t)) for t in grid]
     points.sort(key=lambda point: point[0])
     return _trace(points)
 
@@ -73,7 +74,7 @@ def speed_trace(unit: UnitSignals, until: Ns, columns: int) -> Trace:
     """The speed with its sign, in steps/s, from 0 to `until`, by the laws of the trains; 0 at rest."""
     points: list[tuple[Ns, float]] = [(0, 0.0)]
     before: Ns | None = None  # the end of the motion before
-    for group in _groups(unit.spans, until, columns):
+    for group in _groups(unit.motion.spans, until, columns):
         begin, end = group[0].begins, group[-1].ends
         if before is not None and before != begin:
             points.append((before, 0.0))
@@ -107,7 +108,7 @@ def lane(unit: UnitSignals, pin: str, until: Ns, columns: int) -> Lane:
     """The level of a pin from 0 to `until`; of what happens at 0 only the outcome."""
     before = unit.level_before(pin, 1)
     busy: list[tuple[Ns, Ns]] = []
-    if pin in unit.unlogged and unit.pulse_count > EXACT:
+    if pin in unit.unlogged and unit.motion.pulse_count > EXACT:
         wave = unit.wave(pin, 1, pulses=_NO_PULSES)
         busy = _busy_with_pulses(unit, pin, until, columns)
     else:
@@ -193,7 +194,7 @@ def _busy_with_pulses(unit: UnitSignals, pin: str, until: Ns, columns: int) -> l
     """The columns in which the pin carries a pulse, joined."""
     output = unit.view.pulse_output
     assert output is not None
-    spans = [span for span in unit.spans if output.carries(pin, span.direction)]
+    spans = [span for span in unit.motion.spans if output.carries(pin, span.direction)]
     counts = [0]
     for span in spans:
         counts.append(counts[-1] + span.last - span.first + 1)

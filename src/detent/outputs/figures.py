@@ -209,7 +209,7 @@ class _Timeline:
 
     def head(self, title: str) -> None:
         """Title, and the run in figures."""
-        units, pulses = len(self.signals.recording.units), sum(unit.pulse_count for unit in self.signals.units)
+        units, pulses = len(self.signals.recording.units), sum(unit.motion.pulse_count for unit in self.signals.units)
         about = [
             f"{units} unit{'s' * (units != 1)}", f"{_number(self.signals.until / self.scale)} {self.time_unit}",
             f"{_number(pulses)} step pulse{'s' * (pulses != 1)}",
@@ -240,7 +240,7 @@ class _Timeline:
         self.text(24, self.top + self.speed - 18, "speed (steps/s)", color=GREY)
         trace = curves.speed_trace(unit, self.until, self.columns)
         colour = self.colours[unit.name]
-        if len(unit.spans) > self.columns // CROWDED:
+        if len(unit.motion.spans) > self.columns // CROWDED:
             low, high = curves.envelope(trace, self.until, self.columns)
             axes.fill_between(low.times / self.scale, low.values, high.values, color=colour, alpha=BUSY, linewidth=0)
         else:

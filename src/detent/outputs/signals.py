@@ -4,16 +4,16 @@ Logged changes are held whole. Step pulses, of which there may be any number, ar
 window of time at a time (:meth:`Signals.windows`): nothing here costs a Python step per pulse.
 """
 
-from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
-from detent.cell.recording import Recording, Span
+from detent.cell.recording import Recording
+from detent.outputs.axis_motion import AxisMotion, Pulses
 from detent.outputs.units import UnitLog, UnitView, views
 from detent.outputs.waves import BEFORE_ALL, UNKNOWN, Wave, merge, serial_wave, wave
 from detent.outputs.windings import Driven, connectors
@@ -32,14 +32,6 @@ _MOTION = (MotionStarted, MotionCut, MotionEnded)
 
 def nobody_looks(done: int, total: int) -> None:
     """Nobody wants to know how far it is."""
-
-
-class Pulses(NamedTuple):
-    """Step pulses of one unit: when each begins, its direction (+1, -1), the position behind it."""
-
-    times: Int64Array
-    directions: Int64Array
-    positions: Int64Array
 
 
 def of_cell(cell: Cell, shafts: Mapping[str, int] | None = None) -> "Signals":
@@ -85,17 +77,15 @@ class Signals:
                 logs[unit].take(order, entry)
         found: list[UnitSignals] = []
         for log in logs:
-            first, *others = log.view.axes
-            name = log.view.name
-            own = len(found)
-            found.append(UnitSignals(log, _clipped(recording.motion(name, until, first), until), until))
-            for axis in others:  # each further axis of a unit is one of its own, without the pins
-                alone = UnitLog(UnitView(f"{name}.{axis}", shaft=log.view.shaft))
-                found.append(
-                    UnitSignals(alone, _clipped(recording.motion(name, until, axis), until), until, moves=True)
-                )
+            name, axes = log.view.name, log.view.axes
+            motions = [AxisMotion(recording.motion(name, until, axis), until, log.view.shaft) for axis in axes]
+            own = UnitSignals(log, motions[0], until)
             for connector in connectors(recording, name):
-                found[own].add_windings(Driven(recording, name, connector, found[own:]))
+                own.add_windings(Driven(recording, name, connector, dict(zip(axes, motions, strict=True))))
+            found.append(own)
+            for axis, motion in zip(axes[1:], motions[1:], strict=True):  # each is one of its own, without the pins
+                alone = UnitLog(UnitView(f"{name}.{axis}", shaft=log.view.shaft))
+                found.append(UnitSignals(alone, motion, until, moves=True))
         self.units = tuple(found)
 
     def unit(self, name: str) -> "UnitSignals":
@@ -115,19 +105,19 @@ class Signals:
 
 
 class UnitSignals:
-    """The wires of one unit. `pins` are those that carry something to draw, in the order of the pin table.
+    """The wires of one unit, and the motion of its axis.
 
+    `pins` are those that carry something to draw, in the order of the pin table.
     `windings` are the winding ends that are driven, with what drives them, whether a wire leads from them or not.
     """
 
-    def __init__(self, log: UnitLog, spans: Sequence[Span], until: Ns, *, moves: bool = False) -> None:
+    def __init__(self, log: UnitLog, motion: AxisMotion, until: Ns, *, moves: bool = False) -> None:
         self.view, self.name = log.view, log.view.name
         axes = log.view.axes
         self.title = self.name if len(axes) == 1 else f"{self.name}.{axes[0]}"  # of the axis, for people
-        self.moves = moves or log.view.pulse_output is not None or bool(spans)  # it has an axis
-        self.spans = tuple(spans)
+        self.moves = moves or log.view.pulse_output is not None or bool(motion.spans)  # it has an axis
+        self.motion = motion
         self.pins = log.drawn()
-        self._ends = [span.ends for span in spans]
         self._initial = {pin.name: log.initial(pin) for pin in self.pins.values()}
         self._power = log.power()
         self._until = until
@@ -141,58 +131,13 @@ class UnitSignals:
         """The windings at one of its connectors."""
         self.windings |= dict.fromkeys(driven.pins, driven)
 
-    @property
-    def pulse_count(self) -> int:
-        """How many step pulses the unit gave."""
-        return sum(span.last - span.first + 1 for span in self.spans)
-
-    @property
-    def start(self) -> int:
-        """The position at 0."""
-        if not self.spans:
-            return self.view.shaft
-        span = self.spans[0]
-        return span.shaft + span.direction * (span.first - 1)
-
-    def position(self, t: Ns) -> int:
-        """The position at `t`, pulses of that instant included."""
-        index = bisect_left(self._ends, t)
-        if index < len(self.spans) and self.spans[index].begins <= t:
-            span = self.spans[index]
-            return span.shaft + span.direction * min(max(span.train.steps_by(t), span.first - 1), span.last)
-        if index == 0:
-            return self.start
-        span = self.spans[index - 1]
-        return span.shaft + span.direction * span.last
-
-    def pulses(self, begin: Ns, end: Ns) -> Pulses:
-        """The step pulses with begin <= time < end."""
-        times, directions, positions = [], [], []
-        for span, first, last in self.runs(begin, end):
-            times.append(span.train.times(first, last))
-            directions.append(np.full(last - first + 1, span.direction, np.int64))
-            positions.append(span.shaft + span.direction * np.arange(first, last + 1, dtype=np.int64))
-        none = np.empty(0, np.int64)
-        return Pulses(*(np.concatenate(parts) if parts else none for parts in (times, directions, positions)))
-
-    def runs(self, begin: Ns, end: Ns) -> Iterator[tuple[Span, int, int]]:
-        """The motions that gave pulses with begin <= time < end, and the numbers of the first and last of these."""
-        for index in range(bisect_left(self._ends, begin), len(self.spans)):
-            span = self.spans[index]
-            if span.begins >= end:
-                break
-            first = max(span.first, span.train.steps_by(begin - 1) + 1)
-            last = min(span.last, span.train.steps_by(end - 1))
-            if first <= last:
-                yield span, first, last
-
     def logged(self, pin: str) -> Wave:
         """The changes of a pin that were recorded one by one: without those that follow from pulses."""
         return self._waves[pin]
 
     def pulses_for(self, begin: Ns, end: Ns) -> Pulses:
         """The pulses that can change a pin in a window: also those whose end falls into it."""
-        return self.pulses(begin - (self._output.width if self._output is not None else 0), end)
+        return self.motion.pulses(begin - (self._output.width if self._output is not None else 0), end)
 
     def wave(self, pin: str, begin: Ns = 0, end: Ns | None = None, pulses: Pulses | None = None) -> Wave:
         """The changes of a pin with begin <= time < end (None: all). KeyError for a pin that is not drawn.
@@ -220,12 +165,12 @@ class UnitSignals:
         output = self._output
         if level == UNKNOWN or output is None or pin not in self.unlogged:
             return level
-        return output.active if len(_times_on(pin, output, self.pulses(t - output.width, t))) else level
+        return output.active if len(_times_on(pin, output, self.motion.pulses(t - output.width, t))) else level
 
     def marks(self, limit: int) -> Iterator[Ns]:
         """Times that cut the unit's signals into pieces of at most `limit` pulses, or changes of a pin."""
         room = limit
-        for span in self.spans:
+        for span in self.motion.spans:
             first = span.first
             while span.last - first >= room:
                 first += room
@@ -271,15 +216,3 @@ def _edges(times: Int64Array, output: PulseOutput) -> Wave:
     levels = np.empty(len(both), np.uint8)
     levels[0::2], levels[1::2] = output.active, 1 - output.active
     return Wave(both, levels, np.full(len(both), BEFORE_ALL, np.int64))
-
-
-def _clipped(spans: Sequence[Span], until: Ns) -> list[Span]:
-    """The spans as far as they lie before `until`, or in it."""
-    clipped = []
-    for span in spans:
-        if span.begins > until:
-            break
-        if span.ends > until:
-            span = span._replace(ends=until, last=min(span.last, span.train.steps_by(until)))
-        clipped.append(span)
-    return clipped

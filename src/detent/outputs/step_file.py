@@ -35,7 +35,7 @@ def write(path: Path, signals: Signals, frequency: int, error: Error) -> None:
 def _runs(unit: UnitSignals, scale: Scale, error: Error) -> Iterator[tuple[int, Run]]:
     """The runs of an axis, each with its direction."""
     base: int | None = None
-    for span in unit.spans:
+    for span in unit.motion.spans:
         if span.last < span.first:
             continue
         if base is None:

@@ -47,9 +47,9 @@ def size(signals: Signals) -> int:
     """About how many bytes the file will have."""
     time, total = len(str(signals.until)) + 2, 0
     for unit in signals.units:
-        bits = max(abs(unit.position(signals.until)), abs(unit.start)).bit_length() + 1
+        bits = max(abs(unit.motion.position(signals.until)), abs(unit.motion.start)).bit_length() + 1
         a_pulse = time + bits + 4 + sum(time // 2 + 4 for _ in unit.windings)
-        total += unit.pulse_count * (a_pulse + (time + 6 if unit.unlogged else 0))
+        total += unit.motion.pulse_count * (a_pulse + (time + 6 if unit.unlogged else 0))
         total += sum(len(unit.logged(pin).times) * (time + 3) for pin in unit.pins)
     return total
 
@@ -102,7 +102,7 @@ class _Dump:
                 initial.append(f"b0 {identifier}")
             identifier = next(identifiers)
             lines += [f"$var integer {self._bits} {identifier} position $end", "$upscope $end"]
-            initial.append(f"b{unit.start % (1 << self._bits):b} {identifier}")
+            initial.append(f"b{unit.motion.start % (1 << self._bits):b} {identifier}")
         return "\n".join([*lines, "$enddefinitions $end", *initial, "$end", ""]).encode()
 
     def rows(self, begin: Ns, end: Ns) -> _Rows:
@@ -203,7 +203,7 @@ def _binary(values: Int64Array, bits: int, wanted: Mask) -> tuple[Text, Mask]:
 
 def _fits(unit: UnitSignals, bits: int) -> bool:
     """Whether all positions are signed integers of so many bits."""
-    ends = [unit.start, *(span.shaft + span.direction * span.last for span in unit.spans)]
+    ends = [unit.motion.start, *(span.shaft + span.direction * span.last for span in unit.motion.spans)]
     return all(-(1 << bits - 1) <= end < 1 << bits - 1 for end in ends)
 
 

@@ -4,21 +4,19 @@
 """
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from detent.cell.recording import Recording
 from detent.controllers.device import DriveSet, Powered
+from detent.outputs.axis_motion import AxisMotion
 from detent.outputs.waves import BEFORE_ALL, Wave
 from detent.pulses.rates import rates_at
 from detent.pulses.segment import Int64Array
 from detent.ticks import Ns
-
-if TYPE_CHECKING:
-    from detent.outputs.signals import UnitSignals
 
 Setting: TypeAlias = DriveSet | Powered  # `Powered`: off, so that no winding gets anything
 
@@ -63,8 +61,8 @@ class Changes(NamedTuple):
 class Driven:
     """The windings at one connector. `pins` are their ends, in the order of the counts."""
 
-    def __init__(self, recording: Recording, unit: str, connector: str, axes: "Sequence[UnitSignals]") -> None:
-        """`axes` are the signals of the unit's axes, in the order in which they are told.
+    def __init__(self, recording: Recording, unit: str, connector: str, axes: Mapping[str, AxisMotion]) -> None:
+        """`axes` are the motions of the unit's axes, by name.
 
         ValueError for a connector of which no drive was recorded.
         """
@@ -73,8 +71,7 @@ class Driven:
         told = next((entry for entry in self._settings if isinstance(entry, DriveSet)), None)
         if told is None:
             raise ValueError(f"no drive at connector {connector!r} of {unit} was recorded")
-        names = axes[0].view.axes
-        self._axis = axes[names.index(told.axis)]
+        self._axis = axes[told.axis]
         self.pins = tuple(connector + end for end in told.drive.ends)
         self._since = np.array([entry.at for entry in self._settings], np.int64)
         self._begins = np.array([span.begins for span in self._axis.spans], np.int64)

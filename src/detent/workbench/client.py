@@ -127,7 +127,7 @@ class Bench:
         with theirs:
             # a session of its own: Ctrl-C at the terminal is for the workbench, which then ends it
             self._process = await asyncio.create_subprocess_exec(
-                sys.executable, "-P", "-m", "detent.workbench.engine", str(theirs.fileno()),
+                sys.executable, "-P", "-m", "detent.workbench.process", str(theirs.fileno()),
                 pass_fds=(theirs.fileno(),), stdin=DEVNULL, stdout=DEVNULL, start_new_session=True,
             )  # fmt: skip
         ours.setblocking(False)

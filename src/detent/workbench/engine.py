@@ -1,13 +1,11 @@
-"""The process of a cell on the workbench: it serves the cell with its past, does what it is asked, tells what happened.
+"""The engine of the workbench: it serves a cell with its past, does what it is asked, and tells what happened.
 
-It is started by `Bench.open`, has a pipe to it on the file descriptor that it is given, and ends when that does.
+It runs in a process of its own (`workbench.process`), with a pipe to the process of the pages.
 """
 
 import contextlib
 import gc
-import pickle
 import socket
-import sys
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -41,8 +39,8 @@ from detent.pins import Level
 from detent.realtime import breaking
 from detent.realtime.belonging import safe
 from detent.realtime.cell_source import CellSource, find_cell
-from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
-from detent.realtime.images import Images, ImagesUnusable, cell_name
+from detent.realtime.endpoints.endpoint import Endpoint
+from detent.realtime.images import Images, cell_name
 from detent.realtime.loop import BEHIND, Companion, Loop, ServedLine, stopped_by_signals, wake_exactly
 from detent.realtime.names import Names
 from detent.realtime.pace import Lateness as Counted
@@ -68,7 +66,7 @@ from detent.workbench.messages import (
     State,
 )
 from detent.workbench.mirror import SLACK
-from detent.workbench.pipe import HEAD, Pipe, packed
+from detent.workbench.pipe import Pipe
 
 BASE: Final = 210  # MB of both processes before anything has happened
 BATCH: Final = 480  # bytes that a batch of the recording takes, measured on the drilling cell
@@ -523,45 +521,3 @@ class Engine:
                      breaks, mend,
                      read_back, restart)
     } | {"pace": _set_pace}  # fmt: skip
-
-
-def _engine(end: socket.socket, order: Order) -> Engine:
-    if not order.real:
-        return Engine(end, order)
-    from detent.workbench.driven import DrivenEngine
-
-    return DrivenEngine(end, order)
-
-
-def _read_order(end: socket.socket) -> Order | None:
-    """The first message; None if there is none."""
-    head = end.recv(HEAD.size, socket.MSG_WAITALL)
-    if len(head) < HEAD.size:
-        return None
-    (length,) = HEAD.unpack(head)
-    order = pickle.loads(end.recv(length, socket.MSG_WAITALL))  # of the process that made us
-    return order if isinstance(order, Order) else None
-
-
-def main(descriptor: int) -> int:
-    """Open what the first message on the pipe orders, and serve it until the pipe ends."""
-    end = socket.socket(fileno=descriptor)
-    order = _read_order(end)
-    if order is None:
-        return 0
-    try:
-        with _engine(end, order) as engine:
-            try:
-                engine.run()
-            except Exception as error:
-                engine.fail(error)
-                return 1
-    except (Problem, ImagesUnusable, EndpointError, ValueError) as error:
-        end.setblocking(True)
-        end.sendall(packed(Failed(str(error), "", asked_wrongly=True)))
-        return 2
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1])))

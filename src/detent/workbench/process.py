@@ -1,0 +1,57 @@
+"""What the process of the engine runs: it reads what is ordered of its pipe, and serves until that ends.
+
+`Bench.open` starts it with the file descriptor of its end of the pipe.
+"""
+
+import pickle
+import socket
+import sys
+
+from detent.cell.description import Problem
+from detent.realtime.endpoints.endpoint import EndpointError
+from detent.realtime.images import ImagesUnusable
+from detent.workbench.engine import Engine
+from detent.workbench.messages import Failed, Order
+from detent.workbench.pipe import HEAD, packed
+
+
+def _engine(end: socket.socket, order: Order) -> Engine:
+    if not order.real:
+        return Engine(end, order)
+    from detent.workbench.driven import DrivenEngine
+
+    return DrivenEngine(end, order)
+
+
+def _read_order(end: socket.socket) -> Order | None:
+    """The first message; None if there is none."""
+    head = end.recv(HEAD.size, socket.MSG_WAITALL)
+    if len(head) < HEAD.size:
+        return None
+    (length,) = HEAD.unpack(head)
+    order = pickle.loads(end.recv(length, socket.MSG_WAITALL))  # of the process that made us
+    return order if isinstance(order, Order) else None
+
+
+def main(descriptor: int) -> int:
+    """Open what the first message on the pipe orders, and serve it until the pipe ends."""
+    end = socket.socket(fileno=descriptor)
+    order = _read_order(end)
+    if order is None:
+        return 0
+    try:
+        with _engine(end, order) as engine:
+            try:
+                engine.run()
+            except Exception as error:
+                engine.fail(error)
+                return 1
+    except (Problem, ImagesUnusable, EndpointError, ValueError) as error:
+        end.setblocking(True)
+        end.sendall(packed(Failed(str(error), "", asked_wrongly=True)))
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1])))
