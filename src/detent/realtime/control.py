@@ -257,7 +257,7 @@ class Control:
         unit, text = self._names.unit(given), str(given["text"])
         line = self._cell.wiring.line_of[self._cell.unit(unit)]
         if line >= 0:
-            self._refuse_a_long_queue(line, len(self._cell.talker(unit).frame(text)))
+            self._refuse_a_long_queue(line, len(self._cell.serial_unit(unit).frame(text)))
         self._cell.type(unit, text)
         return self._now()
 
