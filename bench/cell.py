@@ -1,5 +1,6 @@
 """The drilling cell in continuous production, with the recorder on; copies of it while it runs."""
 
+from dataclasses import replace
 from functools import partial
 from heapq import heappop, heappush
 from pathlib import Path
@@ -18,7 +19,7 @@ def drilling() -> Cell:
     """The cell with its stop switch left alone: bar after bar."""
     description = parse((PLACE / "cell.toml").read_text(), "cell.toml")
     script = [entry for entry in description.script if "stop" not in entry.set]
-    return build(description.model_copy(update={"script": script}), lambda file: (PLACE / file).read_text())
+    return build(replace(description, script=script), lambda file: (PLACE / file).read_text())
 
 
 def produce(seconds: int) -> Cell:

@@ -6,9 +6,8 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from pydantic import AliasChoices, BaseModel
 
-from detent.cell import description
+from detent.cell import description, form, tables
 from detent.cell.build import build
 from detent.cell.description import Problem, parse
 
@@ -105,29 +104,25 @@ def test_every_ruling_has_a_proof_that_exists() -> None:
 TABLES = {
     "The file": description.Description,
     "Units": description.Unit,
-    "Wires": description.Wire,
-    "Switches": description.Switch,
-    "Motors": description.Motor,
-    "Lines": description.Line,
-    "Script": description.ScriptEntry,
+    "Wires": tables.Wire,
+    "Switches": tables.Switch,
+    "Motors": tables.Motor,
+    "Lines": tables.Line,
+    "Script": tables.ScriptEntry,
 }
 
 
-def written(model: type[BaseModel]) -> dict[str, str]:
+def written(table: type[object]) -> dict[str, str]:
     """The keys of a table with their defaults, as the page writes them."""
-    keys = {}
-    for name, field in model.model_fields.items():
-        alias = field.validation_alias
-        key = str(alias.choices[0]) if isinstance(alias, AliasChoices) else name
-        default = field.get_default(call_default_factory=True)
-        if field.is_required():
-            keys[key] = "required"
-        elif default in (None, {}, [], ""):
-            keys[key] = ""
+    schema = form.adapter(table).json_schema(mode="validation")
+    found = {}
+    for key in form.keys(table):
+        default = schema["properties"][key].get("default")
+        if key in schema.get("required", ()):
+            found[key] = "required"
         else:
-            keys[key] = str(default).lower()
-    keys.pop("file", None)
-    return keys
+            found[key] = "" if default in (None, {}, [], "") else str(default).lower()
+    return found
 
 
 @pytest.mark.parametrize("title", TABLES)

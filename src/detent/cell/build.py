@@ -11,7 +11,7 @@ from detent.cell import real_pins
 from detent.cell.actions import Power, SetSwitch, TimedAction, Type
 from detent.cell.cell import Cell
 from detent.cell.delivery import Store, Typed, no_store, nobody_asks
-from detent.cell.description import Description, Motor, Problem, ScriptEntry, Unit
+from detent.cell.description import Description, Problem, Unit
 from detent.cell.parts import PARTS, Part
 from detent.cell.switches import AxisSwitch, Switch
 from detent.cell.wiring import Wiring
@@ -28,6 +28,7 @@ from detent.ticks import SECOND, round_ratio
 
 if TYPE_CHECKING:
     from detent.cell.mechanics import Mechanics
+    from detent.cell.tables import Motor, ScriptEntry
 
 LINES: Mapping[str, type[Line]] = {"serial": Line, "microbus": Microbus}
 
@@ -138,7 +139,7 @@ class _Builder:
                 most = f"{pin} gives at most {limits.loads[pin] * 1000:g} mA"
                 raise self.problem(f"{key}.loads", f"{load * 1000:g} mA from {pin}: {most}")
 
-    def check_motor_supply(self, name: str, entry: Motor) -> None:
+    def check_motor_supply(self, name: str, entry: "Motor") -> None:
         """A motor on the power stage of a controller has a supply that this one stands."""
         found = self.models.get(entry.unit or "")
         low, high = found.limits.motor_supply if isinstance(found, Model) else NO_LIMITS.motor_supply
@@ -147,7 +148,7 @@ class _Builder:
             what = f"{entry.supply:g} V: the motors of a {found.name} have {low:g} to {high:g} V"
             raise self.problem(f"motors.{name}.supply", what)
 
-    def look_at_windings(self, name: str, entry: Motor, made: "Mechanics") -> None:
+    def look_at_windings(self, name: str, entry: "Motor", made: "Mechanics") -> None:
         """Remark on a motor that draws more current than its power stage stands."""
         found = self.models.get(entry.unit or "")
         if entry.unit is None or not isinstance(found, Model):
@@ -455,7 +456,7 @@ class _Builder:
 
     # -- script ------------------------------------------------------------------------------------------
 
-    def actions(self, number: int, entry: ScriptEntry) -> list[TimedAction]:
+    def actions(self, number: int, entry: "ScriptEntry") -> list[TimedAction]:
         """What one ``[[script]]`` entry does, in the order set, power, send."""
         key = f"script[{number}]"
         found = []

@@ -7,8 +7,9 @@ from math import inf, pi
 from typing import Any
 
 from detent.cell.contacts import PINS, Contact, Detector
-from detent.cell.description import Current, Description, Motor, Problem, Switch
+from detent.cell.description import Description, Problem
 from detent.cell.mechanics import Mechanics
+from detent.cell.tables import Current, Motor, Switch
 from detent.motors import own
 from detent.motors.damping import Damping, given
 from detent.motors.drive import Currents, Drive
@@ -84,7 +85,7 @@ def with_own_motors(description: Description, read: Callable[[str], str]) -> Des
         except (MotorError, OSError, UnicodeDecodeError) as error:
             what = str(error) if isinstance(error, MotorError) else f"cannot read {entry.motor} or its curve: {error}"
             raise Problem(description.file, f"motors.{name}.motor", what) from None
-    return description.model_copy(update={"motors": motors}) if files else description
+    return replace(description, motors=motors) if files else description
 
 
 def _data_of(file: str, read: Callable[[str], str]) -> dict[str, Any]:

@@ -48,11 +48,6 @@ OutPin = Annotated[str, AfterValidator(_plain)]
 ErrorField = Annotated[Ns | Literal["exact"], BeforeValidator(_error)]
 
 
-def bare(pin: str) -> str:
-    """The name of a pin of a board without its signs."""
-    return pin.lstrip("!^~")
-
-
 class _Table(BaseModel):
     model_config = STRICT
 

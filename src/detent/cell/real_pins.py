@@ -1,13 +1,15 @@
 """Whether the hardware tables of a cell make sense: units, axes, pins, wires. What only a board can tell it tells."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from detent.cell.description import Description, Problem
-from detent.cell.hardware import Hardware, bare
 from detent.controllers import catalogue
 from detent.controllers.device import Controller
 from detent.ticks import MS, show_duration
+
+if TYPE_CHECKING:
+    from detent.cell.hardware import Hardware
 
 DRIVERS_SHARE = ("driver.uart", "driver.transmit", "driver.clock", "driver.mosi", "driver.miso")
 HOLD = "8 ms"  # what a look at a pin and back takes, about
@@ -17,6 +19,11 @@ class Joined(NamedTuple):
     """What the cell itself has on an input: the names of the units, switches and motors that drive it."""
 
     drivers: Sequence[str]
+
+
+def bare(pin: str) -> str:
+    """The name of a pin of a board without its signs."""
+    return pin.lstrip("!^~")
 
 
 def check(described: Description, controllers: Mapping[str, Controller], joined: Callable[[str, str], Joined]) -> None:
@@ -79,7 +86,9 @@ def _model(described: Description, part: str) -> str:
     return described.units[part].model if part in described.units else ""
 
 
-def _check_outputs(table: Hardware, controller: Controller, unit: str, problem: Callable[[str, str], Problem]) -> None:
+def _check_outputs(
+    table: "Hardware", controller: Controller, unit: str, problem: Callable[[str, str], Problem]
+) -> None:
     clocks = set(controller.pulse_output.pins.values())
     outputs = [pin.name for pin in controller.pins if pin.kind.drives and pin.name not in clocks]
     for pin in table.outputs:

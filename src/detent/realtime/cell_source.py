@@ -1,10 +1,11 @@
 """Where a cell comes from that is run, served or looked at: a model by name, or a cell file."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from detent.cell.description import Description, Problem, Switch, parse, single
+from detent.cell.description import Description, Problem, parse, single
 from detent.cell.parts import PARTS
 from detent.controllers import catalogue
 from detent.pins import PinKind
@@ -76,25 +77,32 @@ def _with_choices(
     description: Description, straps: Sequence[str], options: Sequence[str], programs: Sequence[str]
 ) -> Description:
     """The description with what the command line changes in it."""
-    units = {name: unit.model_dump() for name, unit in description.units.items()}
-    for flag, field, items in (("--strap", "straps", straps), ("--set", "options", options)):
+    units = dict(description.units)
+    for flag, items in (("--strap", straps), ("--set", options)):
         for item in items:
             place, value = _pair(flag, item)
             unit, dot, name = place.partition(".")
             if not dot:
                 raise Problem("", flag, f"{item!r}: a cell has several units, write UNIT.NAME=VALUE")
             _need(flag, unit, units)
-            units[unit][field] = {**units[unit][field], name: value}
+            before = units[unit]
+            if flag == "--strap":
+                units[unit] = replace(before, straps={**before.straps, name: value})
+            else:
+                units[unit] = replace(before, options={**before.options, name: value})
     for item in programs:
         unit, file = _pair("--program", item)
         _need("--program", unit, units)
-        units[unit]["program"] = str(Path(file).absolute())
-    changed = {name: type(description.units[name]).model_validate(unit) for name, unit in units.items()}
-    return description.model_copy(update={"units": changed})
+        units[unit] = replace(units[unit], program=str(Path(file).absolute()))
+    return replace(description, units=units)
 
 
 def _with_pins(description: Description, pins: Sequence[str], alone: str) -> Description:
     """The description with inputs held at a level; those of the unit `alone`, if it is, are written without it."""
+    if not pins:
+        return description
+    from detent.cell.tables import Switch
+
     switches = dict(description.switches)
     for item in pins:
         place, value = _pair("--pin", item)
@@ -121,7 +129,7 @@ def _with_pins(description: Description, pins: Sequence[str], alone: str) -> Des
             switches[name if alone else f"{unit} {name}"] = Switch.model_validate({"drives": target, "level": value})
         except ValueError:
             raise Problem("", "--pin", f"{item!r}: a level is 0, 1, low or high") from None
-    return description.model_copy(update={"switches": switches})
+    return replace(description, switches=switches)
 
 
 def _need(flag: str, unit: str, units: Mapping[str, object]) -> None:

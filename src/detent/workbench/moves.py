@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from detent.cell.description import Description, Problem
-from detent.cell.description import Motor as Fitted
 from detent.cell.fitting import load_of, rated
+from detent.cell.tables import Motor as Fitted
 from detent.controllers import catalogue
 from detent.motors.damping import CHOPPER, usual
 from detent.motors.drive import Decay

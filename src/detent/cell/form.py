@@ -1,0 +1,92 @@
+"""Whether a cell file has the right form: known keys, kinds of values, bounds. Each fault is a key and what to do."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
+from reprlib import Repr
+from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
+
+from pydantic import AliasChoices, BaseModel, BeforeValidator, TypeAdapter, ValidationError
+
+from detent.cell import fields as kinds
+from detent.cell import hardware, tables
+
+_TRIED = ("[key]", "constrained-int", "constrained-float", "int", "float", "str")  # no keys, but what was tried
+_BARE = re.compile(r"[A-Za-z0-9_.$ -]{1,64}")
+_NAMES = {**vars(kinds), **vars(tables), **vars(hardware), "Annotated": Annotated, "BeforeValidator": BeforeValidator}
+
+_adapters: dict[type[Any], TypeAdapter[Any]] = {}
+_shown = Repr()
+_shown.maxstring = _shown.maxother = _shown.maxlong = 60
+
+Kind = TypeVar("Kind")
+
+
+class FormError(ValueError):
+    """The faults of a file, one or more: (key, what is wrong and what to do)."""
+
+    def __init__(self, faults: Sequence[tuple[str, str]]) -> None:
+        super().__init__("; ".join(f"{key}: {message}" for key, message in faults))
+        self.faults = faults
+
+
+def check(kind: type[Kind], data: Mapping[str, Any]) -> Kind:
+    """A value of `kind` (a description, or a table of one) from what TOML gives. Raises FormError."""
+    try:
+        return adapter(kind).validate_python(data)
+    except ValidationError as error:
+        # of a key, the last is enough
+        raise FormError(list(dict([_fault(kind, item) for item in error.errors()]).items())) from None
+
+
+def keys(table: type[Any]) -> dict[str, str]:
+    """The keys of a table of a file as they are written, each with the name of its field."""
+    if is_dataclass(table):
+        return {each.name: each.name for each in fields(table) if each.name != "file"}
+    found = {}
+    for name, field in cast("type[BaseModel]", table).model_fields.items():
+        alias = field.validation_alias
+        found[str(alias.choices[0]) if isinstance(alias, AliasChoices) else name] = name
+    return found
+
+
+def adapter(kind: type[Kind]) -> TypeAdapter[Kind]:
+    """What checks values of `kind`, made once. Its fields may name kinds of values without importing them."""
+    made = _adapters.get(kind)
+    if made is None:
+        made = _adapters[kind] = TypeAdapter(kind)
+        made.rebuild(_types_namespace=_NAMES)
+    return made
+
+
+def _tables(kind: type[Any]) -> dict[str, type[Any]]:
+    """The tables of a file by key, each with what its entries are."""
+    found = {}
+    for key, hint in get_type_hints(kind, localns=_NAMES).items():
+        if (inner := get_args(hint)) and isinstance(inner[-1], type):
+            found[key] = inner[-1]
+    return found
+
+
+def _fault(kind: type[Any], item: Any) -> tuple[str, str]:
+    """The key and the message of one of pydantic's errors."""
+    path: list[str] = []
+    for part in item["loc"]:
+        if part in _TRIED:
+            continue
+        if isinstance(part, int):
+            path[-1] += f"[{part + 1}]"
+        else:
+            path.append(part if _BARE.fullmatch(part) else _shown.repr(part))
+    key = ".".join(path)
+    if item["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
+        table = _tables(kind).get(str(item["loc"][0]), kind) if len(item["loc"]) > 1 else kind
+        known = list(keys(table))
+        near = get_close_matches(str(item["loc"][-1]), known, 1, 0.5)
+        hint = f"did you mean {near[0]}? " if near else ""
+        return key, f"there is no such key; {hint}there are: {', '.join(known)}"
+    if item["type"] == "missing":
+        return key, "this key is missing"
+    message = item["msg"].removeprefix("Value error, ").replace("Input should", "it should")
+    return key, f"{message} (it is {_shown.repr(item['input'])})" if not isinstance(item["input"], dict) else message
