@@ -1,5 +1,6 @@
 """`detent tune` and `compare-moves`, as their users type them."""
 
+import csv
 import json
 from pathlib import Path
 
@@ -68,3 +69,25 @@ def test_settings_are_compared_with_the_same_variants(capsys: pytest.CaptureFixt
     assert gentle["moves"][1]["time_s"] > gentle["moves"][0]["time_s"]
     assert "torque used" in run(capsys, *words, "--plot", str(picture))
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_batch_answers_row_by_row_and_a_row_without_answer_says_why(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    rows = tmp_path / "machines.csv"
+    rows.write_text("inertia,friction,moves\n1.5e-5,0.02,60\n1.5e-5,0.7,60\n")
+    words = ["tune", "gs-c200", "--batch", str(rows), "--motor", "qsh4218-41-10-035", "--variants", "64",
+             "--no-corners", "--no-gpu"]  # fmt: skip
+    found, none = [json.loads(line) for line in run(capsys, *words, "--json").splitlines()]
+    assert found["given"] == {"inertia": "1.5e-5", "friction": "0.02", "moves": "60"}
+    assert (found["lost"], found["of"], found["problem"]) == (0, 64, "")
+    assert [line[0] for line in found["commands"]] == ["S", "T", "R"]
+    assert "does not turn this load" in none["problem"]
+    table = list(csv.DictReader(run(capsys, *words).splitlines()))
+    assert [row["settings"] for row in table] == [found["settings"], ""]
+    assert table[1]["problem"] == none["problem"]
+
+
+def test_processes_that_share_the_work_take_no_gpu(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["tune", "gs-c200", *RIG, "--moves", "60", "--gpu", "--workers", "2"]
+    assert "leave one of them out" in run(capsys, *words, code=2)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.motors.moves import SMALL, even, ramped, rig
 
-from detent.motors import engine, gpu, kernel
+from detent.motors import engine, gpu, kernel, variants
 from detent.motors.drive import Drive
 from detent.motors.excitation import Sequencer
 from detent.motors.motor import MotorError
@@ -181,6 +181,7 @@ for one in (steady, changing):
         for name, a, b in zip(plain._fields, plain, there):
             assert np.array_equal(a, b), (name, a, b)
         assert (some.survives(pulses, settle=2_000_000) is None) == (first is None)
+        assert gpu.used()
         print(int(there.lost.sum()))
 """
 
@@ -198,8 +199,31 @@ def test_variants_on_a_gpu_are_those_of_a_processor_in_the_cuda_simulator() -> N
     assert len(set(done.stdout.split())) > 1, done.stdout
 
 
-def test_no_gpu_is_one_clear_line() -> None:
+def test_no_gpu_is_one_clear_line_where_it_was_asked_for() -> None:
     if gpu.available():
         pytest.skip("there is a GPU")
     with pytest.raises(MotorError, match="there is no GPU here that numba sees"):
         gpu.use()
+    gpu.use(where_there_is_one=True)
+    assert not gpu.chosen(gpu.LEAST)
+
+
+def test_a_gpu_that_does_not_work_is_left_alone_unless_it_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The verdicts are then a processor's, and nobody is told that a GPU has judged."""
+
+    def broken(*_: object) -> None:
+        raise RuntimeError("CUDA_ERROR_NO_BINARY_FOR_GPU")
+
+    monkeypatch.setattr(gpu, "available", lambda: True)
+    monkeypatch.setattr(gpu, "LEAST", 1)
+    monkeypatch.setattr(variants, "_on_gpu", broken)
+    some = variants.Ensemble(rig(), variants.corners(variants.SPREAD)[:2])
+    try:
+        gpu.use(where_there_is_one=True)
+        assert not some.judge(even(500, 5), settle=2_000_000).lost.any()
+        assert not gpu.used()
+        gpu.use()
+        with pytest.raises(RuntimeError, match="NO_BINARY"):
+            some.judge(even(500, 5), settle=2_000_000)
+    finally:
+        gpu.use(False)

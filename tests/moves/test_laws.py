@@ -145,7 +145,10 @@ def test_the_stepping_is_what_h_of_a_dcb274_says_and_else_the_usual_one() -> Non
     """Page 40: H 1, the factory value, is a quarter step."""
     assert stepping(laws.law("dcb-274"), {"H": "1/4"}) == "1/4"
     assert stepping(laws.law("dcb-274"), {"H": "Full"}) == "full"
+    assert [winding.name for winding in laws.law("dcb-274").windings] == ["1/4", "1/8", "half", "full", "1/2", "wave"]
     assert stepping(laws.law("gs-c200"), {}) == "half"
+    assert stepping(laws.law("bs0610", {}, "Y"), {"X O": "1", "Y O": "2"}, "Y") == "O2"
+    assert stepping(laws.law("bs0610", {}, "Y"), {"X O": "1", "Y O": "3"}, "Y") == "1/16"
     assert stepping(laws.law("bs0610", {"step_size": "3"}), {}) == ""  # 3/64 divide no full step
 
 

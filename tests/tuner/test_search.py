@@ -193,7 +193,7 @@ def test_a_map_has_a_rate_and_a_time_for_each_point() -> None:
     assert found.lost.shape == found.times.shape == (len(found.y), len(found.x))
     assert found.x[0] <= point[1] <= found.x[-1]
     rows = found.csv().splitlines()
-    assert rows[0].startswith("T,R,")
+    assert rows[0].startswith('"T: slew speed, 10 steps/s","R: ramp length, steps",')
     assert len(rows) == 1 + len(found.x) * len(found.y)
     assert (found.times[0] <= found.times[-1]).all()  # longer ramps take longer
     with pytest.raises(TunerError, match="not written"):

@@ -147,6 +147,7 @@ def made(name: str, options: RigOptions, winding: "Winding | None" = None) -> Ma
     words += assumed
     if options.load_by is not None:
         load = _changing(load, options, motor)
+        words.append(_change_in_words(load, options.load_by))
     damping = None if options.damping is None else given(options.damping)
     if motor.inertia is None:
         return Made(motor, drive, load, None, fit, tuple(words))
@@ -251,6 +252,14 @@ def _changing(load: "Load", options: RigOptions, motor: "Motor") -> "Load":
     elif radius is not None:
         radians["m"] = options.gear / radius
     return read_profile(load, text_of(options.load_by), str(options.load_by), radians)
+
+
+def _change_in_words(load: "Load", file: Path) -> str:
+    by_time = len(load.torque_by_time.values) > 1
+    profile = load.torque_by_time if by_time else load.torque_by_position
+    what = "time, from the start of each move" if by_time else "place, each move plus from where it is 0"
+    low, high = min(profile.values) + load.torque, max(profile.values) + load.torque
+    return f"load {low:.3g} to {high:.3g} Nm by {what} ({file.name})"
 
 
 def _ring_down(rig: "Rig", text: str) -> Any:

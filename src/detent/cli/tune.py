@@ -15,7 +15,7 @@ from detent.cli.tune_on import NO_MACHINE, MachineOptions
 
 if TYPE_CHECKING:
     from detent.tuner.search import Cancelled, Watch
-    from detent.tuner.tune import Rival, Tuned
+    from detent.tuner.tune import Tuned
 
 INTERRUPTED = 130
 Machine = Annotated[MachineOptions, Parameter(name="*")]
@@ -42,7 +42,7 @@ def tune(
     batch: Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    gpu: bool = False,
+    gpu: Annotated[bool | None, Parameter(negative="--no-gpu")] = None,
     json: bool = False,
 ) -> None:
     """Find the fastest settings with which a motor and its load lose no step.
@@ -87,13 +87,13 @@ def tune(
         Write over files that are there.
     batch
         A CSV file with a row for each machine; its columns are options like motor, supply, inertia, friction and moves,
-        in place of those here. Prints it with the settings found, a row as soon as it is known.
+        in place of those here. Prints it with the settings found, a row as soon as it is known; --json: a line each.
     workers
         Divide the work over so many processes of this computer.
     scheduler
         Divide it over the workers of this dask scheduler: tcp://HOST:8786.
     gpu
-        Judge many variants on a GPU.
+        Judge many variants on a GPU: where there is one, unless --no-gpu; --gpu asks that there is.
     json
         Print everything as one line of JSON.
     """
@@ -107,15 +107,12 @@ def tune(
         if machine.on is not None:
             _on_the_machine(model, motor, moves, rig, machine, axis, json)
             return
-        if gpu:
-            from detent.motors.gpu import use
-
-            use()
+        _take_gpu(gpu, divided=workers is not None or scheduler is not None)
         if batch is not None:
             from detent.cli.tune_batch import tune_batch
 
             tune_batch(batch, model, motor, moves, rig, _options(set_), axis, vary, seed, variants, not no_corners,
-                       workers, scheduler)  # fmt: skip
+                       workers, scheduler, json)  # fmt: skip
             return
         if moves is None:
             raise ValueError("--moves: say what is to be fast: --moves 200,1000x3")
@@ -183,6 +180,17 @@ def _divided(workers: int | None, scheduler: str | None) -> "Iterator[dict[str, 
         failed(error)
 
 
+def _take_gpu(wanted: bool | None, *, divided: bool) -> None:
+    """Judge on a GPU where there is one, or as asked; processes that share the work judge on their processors."""
+    from detent.motors import gpu
+
+    if wanted and divided:
+        raise ValueError("--gpu: --workers and --scheduler judge on processors, so that all answers are one: leave "
+                         "one of them out")  # fmt: skip
+    if wanted or (wanted is None and not divided):
+        gpu.use(where_there_is_one=wanted is None)
+
+
 def _options(words: list[str] | None) -> dict[str, object]:
     options: dict[str, object] = {}
     for word in words or ():
@@ -201,8 +209,9 @@ def _law(model: str, options: dict[str, object], axis: str) -> Any:
 
 def _step(rig: RigOptions, model: str) -> str | None:
     """The stepping asked for. ValueError where that is a setting of the controller."""
-    if rig.step is not None and model.lower().startswith("bs0"):
-        raise ValueError(f"--step {rig.step}: the step size of a {model} is an option: --set step_size=4 is 1/16")
+    if rig.step is not None and model.lower().startswith("bs0") and rig.step not in ("O0", "O1", "O2"):
+        raise ValueError(f"--step {rig.step}: the step size of a {model} is an option: --set step_size=4 is 1/16; "
+                         "what --step takes is its step mode: O0, O1, O2")  # fmt: skip
     return rig.step
 
 
@@ -270,7 +279,7 @@ def _map(tuned: "Tuned", paths: list[Path], watch: "Watch", cancelled: "Cancelle
         title = f"{tuned.task.model}: where {tuned.task.rig.motor.name} loses steps"
         about = f"moves of {moves} steps  \N{MIDDLE DOT}  {found.variants} variants a point  \N{MIDDLE DOT}  "
         tuning_figures.write_map(path, found.x, found.y, found.lost, found.times, found.chosen, names=found.names,
-                                 title=title, about=about + str(tuned.found.profile))  # fmt: skip
+                                 labels=found.labels, title=title, about=about + str(tuned.found.profile))  # fmt: skip
 
 
 def _into(tuned: "Tuned", into: Path, from_: Path | None) -> None:
@@ -294,38 +303,15 @@ def _into(tuned: "Tuned", into: Path, from_: Path | None) -> None:
 
 
 def _facts(tuned: "Tuned", made: Made) -> dict[str, Any]:
-    task, found = tuned.task, tuned.found
-    check = found.check
-    facts: dict[str, Any] = {
-        "model": task.model, "motor": task.rig.motor.name, "complete": found.whole,
-        "settings": dict(found.profile.values), "options": dict(found.profile.options),
-        "commands": list(found.profile.settings),
-        "moves": [
-            {"steps": move.steps, "weight": move.weight, "go": found.profile.go(move.steps), "time_s": time,
-             "bound_s": {"nominal": nominal, "worst": worst}}
-            for move, time, nominal, worst in zip(task.moves, found.times, *tuned.bound, strict=True)
-        ],
-        "time_s": found.time, "bound_s": tuned.bound_time, "ratio": tuned.ratio,
-        "check": {"variants": check.variants, "lost": check.lost, "corners": check.corners,
-                  "corners_lost": check.corners_lost, "looks": check.looks, "rate_below": check.bound,
-                  "survived": check.met},
-        "hand": _rival(tuned.hand), "hand_safe": _rival(tuned.safe_hand),
-        "models": [model._asdict() for model in tuned.models], "fails_first": [one._asdict() for one in tuned.fails],
-        "assumed": list(made.words), "seed": task.seed,
-    }  # fmt: skip
-    return facts
+    from detent.motors import gpu
+    from detent.tuner.told import facts
 
-
-def _rival(rival: "Rival | None") -> dict[str, Any] | None:
-    if rival is None:
-        return None
-    return {"settings": dict(rival.profile.values), "options": dict(rival.profile.options),
-            "commands": list(rival.profile.settings), "moves_s": list(rival.times), "time_s": rival.time,
-            "variants": rival.tried, "lost": rival.lost}  # fmt: skip
+    return {**facts(tuned), "assumed": list(made.words), "gpu": gpu.used()}
 
 
 def _print(answers: "list[Tuned]", made: Made, outputs: list[str]) -> None:
     from detent.cli.motor import ranges_of
+    from detent.motors import gpu
 
     drive, first = made.drive, answers[0]
     print(f"{first.task.model} with {made.motor.name}: {drive.supply:g} V, {drive.current:g} A, "
@@ -335,6 +321,8 @@ def _print(answers: "list[Tuned]", made: Made, outputs: list[str]) -> None:
         _print_one(tuned)
     print(f"\nvariants: {ranges_of(first.task.ranges)}")
     print("assumed: " + "; ".join(made.words))
+    if gpu.used():
+        print("judged on the GPU where many variants were asked at once")
     for path in outputs:
         if Path(path).exists():
             print(f"Wrote {path}")
@@ -342,15 +330,15 @@ def _print(answers: "list[Tuned]", made: Made, outputs: list[str]) -> None:
 
 def _print_one(tuned: "Tuned") -> None:
     from detent.cli.motor import print_table, table_of
+    from detent.tuner.told import fails_words, models_words, option_lines
 
     task, found, profile = tuned.task, tuned.found, tuned.found.profile
     if not found.whole:
         print("stopped: the best so far, which nothing has proved yet")
     for line in profile.settings:
         print(f"  {line}")
-    for name, value in profile.options.items():
-        if name != "step_size" or not profile.before:
-            print(f"  option {name} = {value}")
+    for line in option_lines(profile):
+        print(f"  option {line}")
     columns = ["move", "sent as", "found"]
     rivals = [("by hand", tuned.hand)] if tuned.hand is not None else []
     if tuned.safe_hand is not None and tuned.safe_hand != tuned.hand:
@@ -380,9 +368,6 @@ def _print_one(tuned: "Tuned") -> None:
     if task.both_ways:
         print("judged in both directions, as the load pulls")
     if tuned.fails:
-        names = {"torque_constant": "torque"}
-        words = [f"{names.get(one.quantity, one.quantity)} x{one.factor:.2f}" for one in tuned.fails[:4]]
-        print(f"fails first, one at a time: {', '.join(words)}")
+        print(f"fails first, one at a time: {fails_words(tuned)}")
     if tuned.models:
-        words = [f"{one.name} {one.lost}" for one in tuned.models]
-        print(f"in other models, lost of {tuned.models[0].tried}: {', '.join(words)}")
+        print(f"in other models, lost of {tuned.models[0].tried}: {models_words(tuned)}")

@@ -1,29 +1,33 @@
 """`detent tune MODEL --batch FILE`: a machine a row, over processes and machines if asked for."""
 
 import csv
+import json as json_text
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, TextIO, get_args, get_type_hints
 
 from detent.cli.rig import RigOptions
 
 if TYPE_CHECKING:
     from detent.tuner.batch import Answer
+    from detent.tuner.search import Progress, Watch
     from detent.tuner.task import Task
 
 MOST_ROWS = 100_000
 NAMED = ("motor", "moves")  # columns that are no options of the rig
+FOUND = ("settings", "seconds", "lost", "of", "below", "problem", "options")
+PARTS = 1000  # of a row, in the bar
 
 
 def tune_batch(
     path: Path, model: str, motor: str | None, moves: str | None, rig: RigOptions, options: dict[str, object],
     axis: str, vary: list[str] | None, seed: int, variants: int, at_corners: bool,
-    workers: int | None, scheduler: str | None,
+    workers: int | None, scheduler: str | None, json: bool,
 ) -> None:  # fmt: skip
-    """Tune each row, and print the table with what was found as it comes."""
+    """Tune each row, and print the table with what was found as it comes; with `json` a line of JSON each."""
     from detent.cli.endings import asked_wrongly, failed
     from detent.cli.rig import made, spread_of
     from detent.moves.law import winding_of
@@ -48,30 +52,75 @@ def tune_batch(
         asked_wrongly(error)
     except OSError as error:
         failed(f"{error.filename}: {error.strerror}")
-    write = csv.writer(sys.stdout, lineterminator="\n")
-    columns = list(rows[0])
-    write.writerow([*columns, "settings", "seconds", "lost", "of", "below", "problem"])
-    for row, answer in zip(rows, _answers(tasks, workers, scheduler), strict=True):
-        write.writerow([*(row[name] for name in columns), *answer])
-        sys.stdout.flush()
+    out = sys.stdout
+    with _bar(len(tasks)) as bar:
+        # a terminal that shows the bar shows the rows above it
+        table = _Table(sys.stdout if out.isatty() else out, list(rows[0]), json=json)
+        for row, answer in zip(rows, _answers(tasks, workers, scheduler, bar), strict=True):
+            table.add(row, answer)
 
 
-def _answers(tasks: "Sequence[Task]", workers: int | None, scheduler: str | None) -> "Iterator[Answer]":
+class _Table:
+    """What is printed: a CSV table, or a line of JSON for each row."""
+
+    def __init__(self, out: TextIO, columns: list[str], *, json: bool) -> None:
+        self._out, self._columns, self._json = out, columns, json
+        self._write = csv.writer(out, lineterminator="\n")
+        if not json:
+            self._write.writerow([*columns, *FOUND])
+
+    def add(self, row: dict[str, str], answer: "Answer") -> None:
+        """What was found for a row."""
+        if self._json:
+            found = {**dict(zip(FOUND, answer, strict=False)), "options": dict(answer.options),
+                     "commands": list(answer.commands)}  # fmt: skip
+            self._out.write(json_text.dumps({"given": row, **found}) + "\n")
+        else:
+            options = " ".join(f"{name}={value}" for name, value in answer.options.items())
+            self._write.writerow([*(row[name] for name in self._columns), *answer[: len(FOUND) - 1], options])
+        self._out.flush()
+
+
+@contextmanager
+def _bar(rows: int) -> "Iterator[Watch]":
+    """Told how far row `done` is (`best`: which part of it), it shows how far all are."""
+    from detent.cli.unit import progress
+    from detent.hosts.exchange import Progress as Step
+
+    with progress("tuning") as bar:
+
+        def watch(step: "Progress") -> None:
+            bar(Step(int(PARTS * (step.done + (step.best or 0.0))), PARTS * rows, step.doing))
+
+        yield watch
+
+
+def _answers(tasks: "Sequence[Task]", workers: int | None, scheduler: str | None, watch: "Watch") -> "Iterator[Answer]":
     """What was found for each, in order, as it comes."""
     from detent.cli.endings import asked_wrongly, failed
     from detent.extras import MissingExtra
-    from detent.tuner.batch import answers
+    from detent.tuner.batch import answer, answers
+    from detent.tuner.search import Progress
 
+    total = len(tasks)
     if workers is None and scheduler is None:
-        for task in tasks:
-            yield from answers(None, [task])
+        for number, task in enumerate(tasks):
+
+            def inside(step: Progress, number: int = number) -> None:
+                part = min(step.done / max(step.total, 1), 1.0)
+                watch(Progress(number, total, part, f"row {number + 1} of {total}, {step.doing}"))
+
+            yield answer(task, inside)
         return
     from detent.realtime.workers import Workers, WorkersLost
 
     with ExitStack() as stack:
         try:
             found = stack.enter_context(Workers(workers, scheduler))
-            yield from found.map(answers, None, tasks, chunk=1)  # each takes longer than a chunk should
+            watch(Progress(0, total, None, f"{total} rows, {found.count()} workers"))
+            for number, one in enumerate(found.map(answers, None, tasks, chunk=1)):  # each takes longer than a chunk
+                watch(Progress(number + 1, total, None, f"{total} rows, {found.count()} workers"))
+                yield one
         except ValueError as error:
             asked_wrongly(error)
         except (WorkersLost, MissingExtra) as error:

@@ -322,8 +322,9 @@ def _outcomes(move: _Move, par: Floats, loads: Floats, substep: Ns, *, halt: boo
     rig, start = move.rig, move.start
     place, level = start.place, start.level
     rest = _rest(rig, par, loads, place, level)
-    if gpu.chosen(count):
-        state, place = _on_gpu(move, par, rest, loads, substep, halt)
+    there = _on_gpu_if_chosen(move, par, rest, loads, substep, halt)
+    if there is not None:
+        state, place = there
     elif rig.load.is_steady and engine.fast():
         state, place = _abreast(move, par, rest, substep, halt)
     else:
@@ -412,6 +413,24 @@ def _one_by_one(move: _Move, par: Floats, rest: Floats, loads: Floats, substep: 
         if halt and found[7, k] >= 0:
             break
     return found, place
+
+
+def _on_gpu_if_chosen(
+    move: _Move, par: Floats, rest: Floats, loads: Floats, substep: Ns, halt: bool
+) -> tuple[Floats, int] | None:
+    """What a GPU makes of it; None where a processor shall do it, as the GPU is not wanted, or does not work."""
+    if not gpu.chosen(par.shape[1]):
+        return None
+    try:
+        found = _on_gpu(move, par, rest, loads, substep, halt)
+    except MotorError:
+        raise
+    except Exception:  # of a driver: out of memory, a compiler that does not know this GPU
+        if gpu.failed():
+            return None
+        raise
+    gpu.worked()
+    return found
 
 
 def _on_gpu(move: _Move, par: Floats, rest: Floats, loads: Floats, substep: Ns, halt: bool) -> tuple[Floats, int]:

@@ -51,6 +51,12 @@ class Winding(Shared):
             b.append(length * sin(angle))
         return Winding(self.name, self.steps, tuple(a), tuple(b), self.offset)
 
+    def every(self, places: int) -> "Winding":
+        """The same sequence with one step of so many places, which divide a full step."""
+        if self.steps % places:
+            raise MotorError(f"{self.name} has {self.steps} places a step, which {places} does not divide")
+        return Winding(self.name, self.steps // places, self.a[::places], self.b[::places], self.offset)
+
     def on_grid(self, steps: int) -> "Winding":
         """The same sequence counted `steps` places to a full step: it moves on only where it has a place."""
         if steps % self.steps:
@@ -116,22 +122,15 @@ def genstepper(mode: int) -> Winding:
     return Winding(f"O{mode}", grid, tuple(quarter.a[p] for p in places), tuple(quarter.b[p] for p in places), 0.0)
 
 
-CONTROLLERS: dict[str, tuple[Winding, ...]] = {
-    "gs-c200": (FULL, HALF),  # with a GS-D200: UO3 low, high (figure 7)
-    "gs-c200s": (FULL, HALF),
-    "supersigma": (HALF,),  # "half steps per second"
-    "dcb-274": (FULL, microstep(2), microstep(4), microstep(8)),
-    "bs0610": tuple(genstepper(mode) for mode in range(4)),
-    "bs0710": tuple(genstepper(mode) for mode in range(4)),
-}
-"""What each controller, or the drive it is sold with, can do to the windings; the last is its finest."""
-
 GRID = 64
 """Places in a full step of the sequences that can be commanded."""
-_BOARD = CONTROLLERS["bs0610"]
-_DCB_274 = (microstep(8, amplitude=1.0), microstep(4, amplitude=1.0), HALF, FULL, microstep(2, amplitude=1.0), WAVE)
+_BOARD = tuple(genstepper(mode) for mode in range(4))
+DCB_274 = (microstep(8, amplitude=1.0), microstep(4, amplitude=1.0), HALF, FULL, microstep(2, amplitude=1.0), WAVE)
+"""By the number of H (manual, page 40: microsteps have low torque, half steps high, full steps the highest)."""
+ANY_DRIVE = (HALF, FULL, WAVE, HALF_COMPENSATED, *(microstep(2**n) for n in range(1, 7)))
+"""What the drives do that a controller with pulses and direction may be wired to, the usual one first."""
 COMMANDED: dict[str, tuple[Winding, ...]] = {
-    "dcb-274": tuple(table.on_grid(GRID) for table in _DCB_274),  # by H
+    "dcb-274": tuple(table.on_grid(GRID) for table in DCB_274),  # by H
     "bs0610": _BOARD,  # by O
     "bs0710": _BOARD,
 }

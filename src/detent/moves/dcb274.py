@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from detent.controllers import catalogue
 from detent.controllers.dcb274 import commands as dcb274
 from detent.controllers.dcb274.settings import Settings
-from detent.motors.winding import CONTROLLERS
+from detent.motors.winding import DCB_274
 from detent.moves.law import Commands, Law, Setting, Values
 from detent.pulses import Train
 from detent.ramps import timer_table
@@ -41,7 +41,5 @@ def law(found: catalogue.Model, _: Mapping[str, object], axis: str) -> Law:
             Setting("K down", "ramp down, steps each", "steps", down.low, down.high, factory.ramp[1]),
             Setting("D", "speeds divided by", "", divide.low, divide.high, factory.divide),
         ),
-        train, commands, tuple(
-            sorted(CONTROLLERS[found.name], key=lambda winding: winding.name != FACTORY_STEP)
-        ),
+        train, commands, tuple(sorted(DCB_274, key=lambda winding: winding.name != FACTORY_STEP)),
     )  # fmt: skip

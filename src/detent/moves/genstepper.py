@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from detent.controllers import catalogue
 from detent.controllers.genstepper import commands as genstepper
 from detent.controllers.genstepper.link import LARGEST
-from detent.motors.winding import microstep
+from detent.motors.winding import Winding, microstep
+from detent.motors.winding import genstepper as of_mode
 from detent.moves.law import Commands, Law, Setting, Values
 from detent.pulses import Train
 from detent.ramps import tick_accumulator
@@ -37,5 +38,12 @@ def law(found: catalogue.Model, chosen: Mapping[str, object], axis: str) -> Law:
             rate(genstepper.Op.RATE, "run rate", "microsteps/s", "run_rate"),
             rate(genstepper.Op.SLOPE, "slope of the ramps", "microsteps/s\N{SUPERSCRIPT TWO}", "ramp"),
         ),
-        train, commands, () if 64 % size else (microstep(64 // size, amplitude=1.0),),
+        train, commands, _windings(size),
     )  # fmt: skip
+
+
+def _windings(size: int) -> tuple[Winding, ...]:
+    """What steps of size/64 do in the modes of O: 3, as after a reset, by its fraction of a step; then 0 to 2."""
+    if 64 % size:
+        return ()
+    return (microstep(64 // size, amplitude=1.0), *(of_mode(mode).every(size) for mode in range(3)))

@@ -6,8 +6,8 @@ from detent.controllers import catalogue
 from detent.controllers.gsc200 import commands as gsc200
 from detent.controllers.gsc200.arguments import Number, Signed
 from detent.controllers.gsc200.motion import STEPS_PER_SECOND
-from detent.motors.winding import CONTROLLERS
-from detent.moves.law import Commands, Law, Setting, Values, usual_first
+from detent.motors.winding import ANY_DRIVE
+from detent.moves.law import Commands, Law, Setting, Values
 from detent.pulses import Train
 from detent.ramps import constant_acceleration
 
@@ -38,5 +38,5 @@ def law(found: catalogue.Model, _: Mapping[str, object], axis: str) -> Law:
             number(gsc200.Op.TOP, "slew speed", "steps/s", 100, STEPS_PER_SECOND),
             number(gsc200.Op.RAMP, "ramp length", "steps", 40),
         ),
-        train, commands, usual_first(CONTROLLERS[found.name]),
+        train, commands, ANY_DRIVE,
     )  # fmt: skip

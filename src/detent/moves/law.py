@@ -1,6 +1,6 @@
 """What the law of a controller is: its settings with their ranges, the train of a move, the commands that make it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from detent.motors.motor import MotorError
@@ -62,11 +62,14 @@ def in_force(law: Law, registers: Mapping[str, str], axis: str = "") -> dict[str
     return clipped(law, found)
 
 
-def stepping(law: Law, registers: Mapping[str, str]) -> str:
-    """What a pulse does to the windings, if registers tell (H of a DCB-274); else what is usual; "" if unknown."""
+def stepping(law: Law, registers: Mapping[str, str], axis: str = "") -> str:
+    """What a pulse does to the windings, if registers tell; else what is usual; "" if unknown.
+
+    They do by H of a DCB-274, and by O of a GenStepper board.
+    """
     names = [winding.name for winding in law.windings]
-    told = registers.get("H", "").lower()
-    return told if told in names else names[0] if names else ""
+    told = {registers.get("H", "").lower(), f"O{registers.get(f'{axis} O')}"}
+    return next((name for name in names if name in told), names[0] if names else "")
 
 
 def clipped(law: Law, values: Values) -> dict[str, int]:
@@ -87,8 +90,3 @@ def winding_of(law: Law, step: str | None) -> Winding:
     if step not in windings:
         raise MotorError(f"a {law.model} does no {step!r}; there are: {', '.join(windings)}")
     return windings[step]
-
-
-def usual_first(windings: Sequence[Winding]) -> tuple[Winding, ...]:
-    """Half steps first where there are any: with them a controller is usually wired."""
-    return tuple(sorted(windings, key=lambda winding: winding.name != "half"))

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from detent.controllers import catalogue
 from detent.controllers.supersigma import commands as supersigma
 from detent.controllers.supersigma.program import Program
-from detent.motors.winding import CONTROLLERS
+from detent.motors.winding import HALF
 from detent.moves.law import Commands, Law, Setting, Values
 from detent.pulses import Train
 from detent.ramps.short_movements import movement
@@ -34,7 +34,7 @@ def of_program(program: Program, model: str = "supersigma") -> Law:
     title = f"table of {len(program.table.differences)} differences; short movements: {program.short.value}"
     limit = Setting("limit", "speed limit", "half steps/s", 1, most, most, supersigma.SPEED_UNIT)
     return Law(model, title, "half steps", supersigma.LARGEST_STEPS, (limit,), train, commands,
-               CONTROLLERS[model])  # fmt: skip
+               (HALF,))  # fmt: skip
 
 
 def _fastest(program: Program) -> float:

@@ -19,9 +19,11 @@ LEVELS = 9  # contours of the time
 
 def write_map(
     path: Path, x: Sequence[int], y: Sequence[int], lost: Floats, times: Floats, chosen: tuple[int, int], *,
-    names: tuple[str, str], title: str, about: str,
+    names: tuple[str, str], labels: tuple[str, str], title: str, about: str,
 ) -> None:  # fmt: skip
     """Draw loss rates (a row a y, a column an x), contours of the time in s, a star at `chosen`.
+
+    `names` are those of the axes in short, `labels` say what they count.
 
     ValueError for another suffix, ImportError, OSError.
     """
@@ -48,7 +50,7 @@ def write_map(
         axes.plot(*chosen, marker="*", markersize=17, color=COLOURS[0], markeredgecolor="white", linestyle="none",
                   label=f"chosen: {names[0]} {chosen[0]}, {names[1]} {chosen[1]}")  # fmt: skip
         axes.legend(loc="upper left", framealpha=0.9)
-        dress(axes, names[0], names[1])
+        dress(axes, *labels)
         _plain_ticks(axes)
         bar = figure.colorbar(mesh, cax=figure.add_axes((0.91, 0.1, 0.018, 0.74)))
         bar.set_label("variants that lose steps (%)")

@@ -1,9 +1,9 @@
 """Many tasks, each its own answer: a row of a batch."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from detent.tuner.search import search
+from detent.tuner.search import Watch, nobody, search
 from detent.tuner.task import Task
 
 
@@ -16,6 +16,8 @@ class Answer(NamedTuple):
     tried: int | None = None
     below: float | None = None  # what that proves of the rate of losses, at 95 %
     problem: str = ""
+    commands: tuple[str, ...] = ()
+    options: Mapping[str, str] = {}  # that no command sets
 
 
 def answers(_: object, tasks: Sequence[Task]) -> list[Answer]:
@@ -23,11 +25,12 @@ def answers(_: object, tasks: Sequence[Task]) -> list[Answer]:
     return [answer(task) for task in tasks]
 
 
-def answer(task: Task) -> Answer:
+def answer(task: Task, watch: Watch = nobody) -> Answer:
     """The answer to a task. It hangs on the task alone."""
     try:
-        found = search(task)
+        found = search(task, watch=watch)
     except ValueError as error:  # nothing moves this load, or a motor without data
         return Answer(problem=str(error))
-    check = found.check
-    return Answer(str(found.profile), round(found.time, 9), check.lost, check.variants, check.bound)
+    check, profile = found.check, found.profile
+    return Answer(str(profile), round(found.time, 9), check.lost, check.variants, check.bound, "", profile.settings,
+                  dict(profile.options))  # fmt: skip

@@ -23,6 +23,7 @@ class Map(NamedTuple):
     """
 
     names: tuple[str, str]
+    labels: tuple[str, str]  # what x and y count
     x: tuple[int, ...]
     y: tuple[int, ...]
     lost: Floats  # the part of the variants that lose a step
@@ -38,7 +39,7 @@ class Map(NamedTuple):
 
     def csv(self) -> str:
         """The map as a table."""
-        head = f"{self.names[0]},{self.names[1]},loss rate of {self.variants},s"
+        head = ",".join(f'"{label}"' for label in self.labels) + f",loss rate of {self.variants},s"
         return "\n".join([head, *(f"{x},{y},{lost:.6g},{time:.9g}" for x, y, lost, time in self.rows())]) + "\n"
 
 
@@ -78,4 +79,4 @@ def loss_map(
         if cancelled():
             raise TunerError("the map was stopped before it was whole, and is not written")
         watch(Progress(k + len(some), len(jobs), None, "map"))
-    return Map(space.plane, x, y, lost, times, variants, (point[x_at], point[y_at]), point)
+    return Map(space.plane, space.labels, x, y, lost, times, variants, (point[x_at], point[y_at]), point)

@@ -60,8 +60,9 @@ class Profile(NamedTuple):
 
 
 class Space(NamedTuple):
-    """What may be chosen. `plane` are the two dimensions of a map: the slew speed, and what makes ramps longer.
+    """What may be chosen.
 
+    `plane` are the two dimensions of a map: the slew speed, and what makes ramps longer; `labels` say what they count.
     `least` is seconds below which no move of a point is, where its pulses cost much to compute; None: they do not.
     `slower` makes the ramps of a point longer by a factor.
     """
@@ -71,6 +72,7 @@ class Space(NamedTuple):
     hand: Point
     slower: Callable[[Point, float], Point]
     plane: tuple[str, str]
+    labels: tuple[str, str]
     admits: Callable[[Point], bool] = lambda _: True
     least: Callable[[Point], tuple[float, ...]] | None = None
 
@@ -139,7 +141,9 @@ def _gsc200(task: Task, torque: Torque, hand: ByHand) -> Space:
     def slower(point: Point, factor: float) -> Point:
         return (point[0], point[1], _within(point[2] * factor + 1, ramp))
 
-    return Space(dimensions, profile, best, slower, ("T", "R"), lambda point: point[0] < point[1])
+    return Space(
+        dimensions, profile, best, slower, ("T", "R"), (_label(slew), _label(ramp)), lambda point: point[0] < point[1]
+    )
 
 
 def _dcb274(task: Task, torque: Torque, hand: ByHand) -> Space:
@@ -179,7 +183,8 @@ def _dcb274(task: Task, torque: Torque, hand: ByHand) -> Space:
     def admits(point: Point) -> bool:
         return point[0] < point[1] and point[2] <= 2 * point[3] and point[3] <= point[2]
 
-    return Space(dimensions, profile, best, slower, ("V", "K up"), admits)
+    labels = _label(settings["V"]), _label(up)
+    return Space(dimensions, profile, best, slower, ("V", "K up"), labels, admits)
 
 
 def _genstepper(task: Task, torque: Torque, hand: ByHand) -> Space:
@@ -188,6 +193,7 @@ def _genstepper(task: Task, torque: Torque, hand: ByHand) -> Space:
     sizes = [size for size in (1, 2, 4, 8, 16, 32, 64) if all(distance % size == 0 for distance in distances)]
     if "step_size" in task.options or given not in sizes:
         sizes = [given]
+    mode = next((k for k, one in enumerate(task.law.windings) if one.name == task.rig.drive.winding.name), 0)
     laws = {size: law(task.model, {**task.options, "step_size": str(size)}, task.axis) for size in sizes}
     most = tick_accumulator.UPDATES
     speeds = _Speeds.of(torque, hand)
@@ -216,7 +222,7 @@ def _genstepper(task: Task, torque: Torque, hand: ByHand) -> Space:
             return None
         found = laws[size]
         before = () if sizes == [given] and "step_size" not in task.options else (f"{size}{Op.RESET.value}",)
-        return Profile(found, dict(zip("KRP", values, strict=True)), found.windings[0], (given, size), before,
+        return Profile(found, dict(zip("KRP", values, strict=True)), found.windings[mode], (given, size), before,
                        {"step_size": str(size)})  # fmt: skip
 
     size = given if given in sizes else sizes[0]
@@ -226,7 +232,8 @@ def _genstepper(task: Task, torque: Torque, hand: ByHand) -> Space:
     def slower(point: Point, factor: float) -> Point:
         return (*point[:3], max(round(point[3] / factor), 1))
 
-    return Space(dimensions, profile, best, slower, ("R", "P"), lambda point: point[1] < point[2])
+    labels = "R: run rate, full steps/s", "P: slope of the ramps, full steps/s\N{SUPERSCRIPT TWO}"
+    return Space(dimensions, profile, best, slower, ("R", "P"), labels, lambda point: point[1] < point[2])
 
 
 def _supersigma(task: Task, torque: Torque, hand: ByHand) -> Space:
@@ -256,7 +263,16 @@ def _supersigma(task: Task, torque: Torque, hand: ByHand) -> Space:
     def slower(point: Point, factor: float) -> Point:
         return (point[0], point[1], max(round(point[2] / factor), 5))
 
-    return Space(dimensions, profile, best, slower, ("to", "torque"), lambda point: point[0] < point[1], least)
+    return Space(dimensions, profile, best, slower, ("to", "torque"), _TABLE, lambda point: point[0] < point[1], least)
+
+
+_TABLE = "end of the table, half steps/s", "torque that the table uses, thousandths of the motor's"
+
+
+def _label(setting: Setting) -> str:
+    """What a setting counts: T: slew speed, 10 steps/s."""
+    scale = f"{setting.scale} " if setting.scale > 1 else ""
+    return f"{setting.name}: {setting.title}, {scale}{setting.unit}"
 
 
 _MAKE = {

@@ -45,11 +45,12 @@ class GenStepper(Board):
         return link.undress(data)
 
     def registers(self, now: Ns) -> dict[str, str]:
-        """K, P and R of each motor, the mark of M, A of both, and where a motion leads."""
-        found = {"A": str(self._auto)}
+        """K, P, R and O of each motor, the mark of M, where a motion leads; A and the step size (!) of both."""
+        found = {"A": str(self._auto), "!": str(self._step_size)}
         for axis, motor in self._motors.items():
             found |= {f"{axis} K": str(motor.keep), f"{axis} P": str(motor.slope), f"{axis} R": str(motor.rate),
-                      f"{axis} M": str(motor.mark), f"{axis} G": str(motor.seen_target(now))}  # fmt: skip
+                      f"{axis} O": str(motor.mode), f"{axis} M": str(motor.mark),
+                      f"{axis} G": str(motor.seen_target(now))}  # fmt: skip
         return found
 
     def program_memory(self) -> bytes:
