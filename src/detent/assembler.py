@@ -13,11 +13,12 @@ A source in error raises `AssemblyFailed`, which holds every error, not only the
 Work and report grow no faster than the source, and what cannot be the source of a program is refused unread.
 """
 
-import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
+
+from detent.nearest import did_you_mean
 
 Ins = TypeVar("Ins")  # an instruction of the language, whatever it is
 Out = TypeVar("Out", covariant=True)
@@ -125,6 +126,15 @@ class Remains(Protocol):
         """The bytes of an image that belong to no program, though they are not blank."""
 
 
+@runtime_checkable
+class Closed(Protocol):
+    """What a language has besides in which a part of a program ends with a byte of its own, `blank`, behind it."""
+
+    @property
+    def closing(self) -> str:
+        """The line that puts it there."""
+
+
 class SourceError(NamedTuple):
     """One thing wrong with a source: line and column count from 1; the message holds a remedy."""
 
@@ -192,7 +202,8 @@ class Assembly(Generic[Ins]):
 
         Assembled again they give the same bytes at the same addresses.
         """
-        origin, closing = getattr(self.language, "origin", None), getattr(self.language, "closing", None)
+        origin = getattr(self.language, "origin", None)
+        closing = self.language.closing if isinstance(self.language, Closed) else None
         lines: list[str] = []
         here = self.language.areas[0].start
         for placed in self.placed:
@@ -275,6 +286,8 @@ class _Assembler(Generic[Ins]):
                 break
         else:
             self.end()
+            if not self.ended and self.found:
+                self.close(self.found[-1].number, self.found[-1].column)
             self.report_overflow()
         if len(self.errors) >= MOST_ERRORS:
             raise AssemblyFailed(self.name, self.lines, self.errors)
@@ -318,6 +331,8 @@ class _Assembler(Generic[Ins]):
             self.wrong(number, column + error.offset, error.message + hint)
             return
         origin = parsed.origin
+        if (parsed.ends or origin is not None) and self.begun and not self.ended:
+            self.close(number, column)
         if parsed.ends and self.begun and not self.ended:
             self.ended = number
         elif parsed.ends:
@@ -388,6 +403,14 @@ class _Assembler(Generic[Ins]):
         column = self.lines[number - 1].index(label) + 1
         self.place(_Line(number, column, self.address, Statement(ending), ending, self.language.length(ending)))
 
+    def close(self, number: int, column: int) -> None:
+        """The part ends here: the byte behind it may not be an instruction of another, which its end mark would hit."""
+        if isinstance(self.language, Closed) and self.address in self.taken:
+            held = (
+                f"the end mark of this part would stand at {self.address}, where line {self.taken[self.address].number}"
+            )
+            self.wrong(number, column, f"{held} has put an instruction; leave a byte between them")
+
     def report_overflow(self) -> None:
         """Say by how much the part that ends here is too long, at the first instruction that does not fit."""
         if self.overflow is None:
@@ -430,8 +453,8 @@ class _Assembler(Generic[Ins]):
         """The remedy for an unknown label."""
         self.compared += len(self.symbols)
         near = self.symbols if self.compared <= _MOST_COMPARED and len(label) <= LONGEST_LABEL else ()
-        close = difflib.get_close_matches(label, near, n=1)
-        return f"; did you mean {close[0]}?" if close else f"; write {label}: before an instruction"
+        hint = did_you_mean(label, near, 0.6).strip()
+        return f"; {hint}" if hint else f"; write {label}: before an instruction"
 
     def check_target(self, line: _Line[Ins], target: int) -> None:
         """A jump to a number must end at an instruction, or outside this source if the language is open."""

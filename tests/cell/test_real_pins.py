@@ -73,7 +73,7 @@ def test_a_cell_is_the_same_with_its_tables() -> None:
             '["LY-", "LY+"]\ninputs = { "LY+" = "gpio40" }',
             "table.Y.unwired: LY+ is wired in hardware.",
         ),
-        ("UI1 =", "UI4 =", "hardware.slide.inputs.UI4: no input of slide 'UI4'; did you mean UI3?"),
+        ("UI1 =", "UI4 =", "hardware.slide.inputs.UI4: no input of slide 'UI4'; did you mean UI1, UI2 or UI3?"),
         ("MOV =", "CLOCK =", "hardware.slide.outputs.CLOCK: CLOCK carries the steps: name its pin with step"),
         ("MOV =", "EOT =", "hardware.slide.outputs.EOT: no output of slide 'EOT'"),
         ("[hardware.slide]", "[hardware.slid]", "hardware.slid: no controller 'slid'; did you mean slide?"),

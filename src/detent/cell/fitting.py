@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields, replace
-from difflib import get_close_matches
 from math import inf, pi
 from typing import Any
 
@@ -22,6 +21,7 @@ from detent.motors.motor import MotorError
 from detent.motors.named import motor as named
 from detent.motors.rotor import Rig
 from detent.motors.winding import COMMANDED, GRID, Winding, winding
+from detent.nearest import did_you_mean
 
 HALF_A_STEP = 0.5
 
@@ -114,8 +114,7 @@ def _as_sold(name: str, entry: Motor) -> Rated:
     given: dict[str, Any] = {}
     for key, value in entry.data.items():
         if key not in known:
-            near = get_close_matches(key, known, 1, 0.5)
-            hint = f"did you mean {near[0]}? " if near else ""
+            hint = did_you_mean(key, known)
             raise MotorError(f"data: a motor has no {key!r}; {hint}there are: {', '.join(known)}")
         if isinstance(value, str) != isinstance(known[key].default, str):
             kind = "a word" if isinstance(known[key].default, str) else "a number"
@@ -218,8 +217,7 @@ def load_of(entry: Motor) -> Load:
     known = {field.name for field in fields(Mechanics_)}
     for key in entry.mechanics:
         if key not in known:
-            near = get_close_matches(key, known, 1, 0.5)
-            hint = f"did you mean {near[0]}? " if near else ""
+            hint = did_you_mean(key, known)
             raise MotorError(f"mechanics: there is no {key!r}; {hint}there are: {', '.join(sorted(known))}")
     mechanics = Mechanics_(**entry.mechanics)
     felt = mechanics.load()

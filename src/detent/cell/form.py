@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from difflib import get_close_matches
 from reprlib import Repr
 from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
 
@@ -11,6 +10,7 @@ from pydantic import AliasChoices, BaseModel, BeforeValidator, TypeAdapter, Vali
 
 from detent.cell import fields as kinds
 from detent.cell import hardware, tables
+from detent.nearest import did_you_mean
 
 _TRIED = ("[key]", "constrained-int", "constrained-float", "int", "float", "str")  # no keys, but what was tried
 _BARE = re.compile(r"[A-Za-z0-9_.$ -]{1,64}")
@@ -83,8 +83,7 @@ def _fault(kind: type[Any], item: Any) -> tuple[str, str]:
     if item["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         table = _tables(kind).get(str(item["loc"][0]), kind) if len(item["loc"]) > 1 else kind
         known = list(keys(table))
-        near = get_close_matches(str(item["loc"][-1]), known, 1, 0.5)
-        hint = f"did you mean {near[0]}? " if near else ""
+        hint = did_you_mean(str(item["loc"][-1]), known)
         return key, f"there is no such key; {hint}there are: {', '.join(known)}"
     if item["type"] == "missing":
         return key, "this key is missing"

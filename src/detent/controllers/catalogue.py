@@ -4,7 +4,6 @@ The command line, the cell files, the help and the reference pages read `MODELS`
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
 from typing import Any, NamedTuple, Protocol
 
 from detent.assembler import Language
@@ -32,6 +31,7 @@ from detent.controllers.supersigma import pins as supersigma_pins
 from detent.controllers.supersigma.firmware import Supersigma
 from detent.controllers.supersigma.phrases import Phrases as SupersigmaPhrases
 from detent.controllers.supersigma.program import LEAST_OFFSET
+from detent.nearest import CUTOFF, did_you_mean
 from detent.pins import Level, Pin
 from detent.ramps import differences
 from detent.ramps.ways import Way
@@ -97,17 +97,10 @@ class Model(NamedTuple):
 def unknown(kind: str, name: str, known: Sequence[str], *, guess: bool = True) -> CatalogueError:
     """The error for a name that is not among the known ones, with the likeliest of them.
 
-    Without `guess` only another case of it is suggested. Never one end of an axis, like LX-, where LX+ is there too.
+    Without `guess` only another case of it is suggested.
     """
-    near = [k for k in known if k.lower() == name.lower()]
-    if guess and not near:
-        near = [k for k in get_close_matches(name, known, 1, 0.5) if _opposite(k) == k or _opposite(k) not in known]
-    hint = f"did you mean {near[0]}? " if near else ""
+    hint = did_you_mean(name, known, CUTOFF if guess else 1)
     return CatalogueError(f"no {kind} {name!r}; {hint}there are: {', '.join(known)}")
-
-
-def _opposite(name: str) -> str:
-    return name[:-1] + {"+": "-", "-": "+"}.get(name[-1:], name[-1:])
 
 
 def model(name: str) -> Model:

@@ -5,12 +5,12 @@ that gives is not reached), whether the drive passes between the microsteps by i
 switches. The rest of a chip (protection, ripple, current regulation by back EMF) is not modelled.
 """
 
-from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 from detent.motors.drive import Decay, Drive
 from detent.motors.motor import MotorError
 from detent.motors.winding import Winding
+from detent.nearest import did_you_mean
 
 
 class Preset(NamedTuple):
@@ -39,8 +39,7 @@ def drive(name: str, supply: float, current: float, winding: Winding, **more: An
     """The drive of that name; `more` as in `Drive`, and above what the name says. MotorError for another name."""
     preset = PRESETS.get(name.lower())
     if preset is None:
-        near = get_close_matches(name.lower(), PRESETS, 1, 0.5)
-        hint = f"did you mean {near[0]}? " if near else ""
+        hint = did_you_mean(name.lower(), PRESETS)
         raise MotorError(f"no drive {name!r}; {hint}there are: {', '.join(PRESETS)}")
     if preset.interpolation and winding.steps < 4:
         # between coarser places a straight line is no circle

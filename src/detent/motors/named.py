@@ -5,10 +5,10 @@ factor on the inductance and their viscous friction come; for every other motor 
 speed is optimistic by 10 to 20 percent of the holding torque: fit your own curve (`fit.fit_from_curve`).
 """
 
-from difflib import get_close_matches
 from typing import NamedTuple
 
 from detent.motors.motor import Motor, MotorError
+from detent.nearest import did_you_mean
 
 TRINAMIC = "Trinamic QSH4218 manual V1.03 (2007-11-13), table 4.1 and figures 4.1 to 4.3"
 MOTIONKING = "MotionKing MK1106 catalogue, revision 4, 17HS series"
@@ -83,7 +83,6 @@ def motor(name: str) -> Motor:
     """The motor of that name. MotorError with the likeliest other name."""
     found = MOTORS.get(name.lower())
     if found is None:
-        near = get_close_matches(name.lower(), MOTORS, 1, 0.5)
-        hint = f"did you mean {near[0]}? " if near else ""
+        hint = did_you_mean(name.lower(), MOTORS)
         raise MotorError(f"no motor {name!r}; {hint}there are: {', '.join(MOTORS)}")
     return found

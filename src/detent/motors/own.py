@@ -22,7 +22,6 @@ step = "half"
 
 import tomllib
 from collections.abc import Sequence
-from difflib import get_close_matches
 from math import isfinite, pi
 from typing import Any, NamedTuple
 
@@ -30,6 +29,7 @@ from detent.motors.drive import Drive
 from detent.motors.fit import Fit, Point, fit_from_curve
 from detent.motors.motor import Motor, MotorError
 from detent.motors.winding import winding
+from detent.nearest import did_you_mean
 
 NUMBERS = ("resistance", "inductance", "current", "torque", "inertia", "detent_torque", "steps", "inductance_factor",
            "viscous", "damping", "accuracy")  # fmt: skip
@@ -94,9 +94,8 @@ def _value(file: str, key: str, value: object) -> object:
 def _check_keys(file: str, where: str, data: dict[str, Any], known: Sequence[str]) -> None:
     for key in data:
         if key not in known:
-            near = get_close_matches(key, known, 1, 0.5)
-            hint = f"did you mean {near[0]}? " if near else ""
-            raise MotorError(f"{file}: {where}{key}: there is no such key; {hint}there are: {', '.join(known)}")
+            what = f"{file}: {where}{key}: there is no such key"
+            raise MotorError(f"{what}; {did_you_mean(key, known)}there are: {', '.join(known)}")
 
 
 def _curve(file: str, data: object, motor: Motor) -> Curve:

@@ -1,11 +1,11 @@
 """Settings as people write them: I=800 V=6000 K=7,5."""
 
 from collections.abc import Sequence
-from difflib import get_close_matches
 
 from detent.controllers import catalogue
 from detent.moves.law import Law, Setting, Values
 from detent.moves.laws import law
+from detent.nearest import did_you_mean
 
 
 class SettingError(ValueError):
@@ -52,9 +52,9 @@ def _numbers(law: Law, name: str, text: str) -> dict[str, int]:
     settings = [setting for setting in law.settings if _letter(setting).lower() == name.lower()]
     if not settings:
         names = list(dict.fromkeys(_letter(setting) for setting in law.settings))
-        near = get_close_matches(name, names, 1, 0.6)
-        hint = f"did you mean {near[0]}? " if near else ""
-        raise SettingError(f"{law.model} has no setting {name!r}; {hint}there are: {', '.join(names)}")
+        raise SettingError(
+            f"{law.model} has no setting {name!r}; {did_you_mean(name, names, 0.6)}there are: {', '.join(names)}"
+        )
     parts = [part.strip() for part in text.split(",")]
     if len(parts) not in (1, len(settings)):
         raise SettingError(f"{name}={text}: give one number, or {len(settings)} with commas between")

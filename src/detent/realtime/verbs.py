@@ -5,9 +5,9 @@ read this table. Arguments are given by name, as JSON has them or as they are ty
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
 from typing import Final, NamedTuple, TypeAlias
 
+from detent.nearest import did_you_mean
 from detent.ticks import SECOND, parse_duration
 
 SHORT_WAIT: Final = 60.0  # seconds of the wall clock that what waits waits, unless it is said otherwise
@@ -38,9 +38,7 @@ class AskedWrongly(ValueError):
 
 def unknown(kind: str, name: str, known: Sequence[str]) -> AskedWrongly:
     """The error for a name that is not among the known ones."""
-    near = get_close_matches(name, known, 1, 0.5) or [k for k in known if k.lower() == name.lower()]
-    hint = f"did you mean {near[0]}? " if near else ""
-    return AskedWrongly(f"no {kind} {name!r}", f"{hint}there are: {', '.join(known) or 'none'}")
+    return AskedWrongly(f"no {kind} {name!r}", f"{did_you_mean(name, known)}there are: {', '.join(known) or 'none'}")
 
 
 class Kind(NamedTuple):

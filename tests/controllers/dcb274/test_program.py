@@ -8,6 +8,7 @@ from tests.controllers.dcb274.bench_unit import Bench
 from detent.assembler import AssemblyFailed, ImageError, assemble, disassemble
 from detent.controllers.dcb274 import commands, program
 from detent.controllers.dcb274.commands import ROWS, TABLE, Instruction, Op, Refusal
+from detent.controllers.dcb274.firmware import Dcb274
 from detent.controllers.dcb274.memory import FACTORY_PROGRAM
 
 LENGTHS = {4: "+-ROJL", 5: "Tik", 3: "IVMFKBWGY", 2: "ADHblw]Z|E", 1: "@^", 0: "CPQSX[\\"}
@@ -178,3 +179,26 @@ def test_a_unit_lists_and_stores_again_what_it_holds(instruction: Instruction) -
     assert listed[1] == f"300 {text}"
     bench.do("P 300", listed[1].partition(" ")[2], "P", wait=5_000_000)
     assert bench.unit.memory.read(300, 6) == code
+
+
+def test_what_is_left_of_an_older_program_in_a_memory_is_left_out_and_said():
+    memory = bytearray(Dcb274().kept_memory())
+    memory[:5] = b"\x1d\x01\x1d\x00\xff"  # ] 1 and ] 0 over the program of page 39
+    rest = FACTORY_PROGRAM[5:].hex(" ").upper()
+    source = disassemble(program.language(), bytes(memory))
+    assert source.splitlines() == ["] 1", "] 0", f"; left of an older program at 5, behind an end mark: {rest}"]
+    memory[0] = 0x64
+    with pytest.raises(ImageError, match="byte 0 holds 64h"):
+        disassemble(program.language(), bytes(memory))
+
+
+def test_page_47_the_end_mark_of_a_part_may_not_stand_in_one_before_it():
+    with pytest.raises(AssemblyFailed, match="end mark of this part would stand at 2, where line 2 has put"):
+        assemble(program.language(), "P 2\nA 16\nP\nP 0\nA 8\nP\n")
+    assert assemble(program.language(), "P 0\nA 8\nP\nP 2\nA 16\nP\n").typed == ("A 8", "A 16")  # it is written over
+
+
+def test_a_program_that_is_put_into_the_eeprom_has_an_end_mark_behind_it():
+    unit = Dcb274()
+    unit.restore(b"\x01\x08\x01\x10")
+    assert unit.kept_memory()[:6] == b"\x01\x08\x01\x10\xffd"

@@ -40,15 +40,19 @@ class Memory:
         self.writes: dict[int, int] = {}  # address -> how often it was written
 
     def restore(self, image: bytes) -> None:
-        """Take a kept image, or a program that begins at address 0. Raises `detent.assembler.ImageError`."""
+        """Take a kept image, or a program that begins at address 0, behind which an end mark is put.
+
+        Raises `detent.assembler.ImageError`.
+        """
         if len(image) > SIZE:
             raise ImageError(f"{len(image)} bytes: the memory has {SIZE}")
         if len(image) == SIZE:
             self.nv = image
         else:
             whole = bytearray(self.nv)
+            ended = image + bytes((program.END,))
             for area in program.AREAS:
-                part = image[area.start : area.stop]
+                part = ended[area.start : area.stop]
                 whole[area.start : area.start + len(part)] = part
             self.nv = bytes(whole)
         self.load_shadow()

@@ -314,22 +314,27 @@ class Board:
         for axis, motor in self._motors.items():
             asked, before = self._held(axis), self._keys[axis]
             self._keys[axis] = asked
+            self._note_rest(motor, now)
             if asked is not before:
                 self._unheeded = tuple(name for name in self._unheeded if name != axis)
-                if asked.value:
-                    motor.slew(asked.value, now)
-                else:
+                if not asked.value:
                     motor.stop(now)
-            if not motor.idle:
-                self._rests_until[axis] = NEVER
-            elif self._rests_until[axis] >= NEVER:
-                self._rests_until[axis] = motor.next_tick(now)
+                elif not motor.idle or self._rests_until[axis] <= now:
+                    motor.slew(asked.value, now)
+                self._note_rest(motor, now)
             if not asked.value or not motor.idle or axis in self._unheeded or self._limits.closed(axis, asked.value):
                 continue
             if self._rests_until[axis] <= now:
                 motor.slew(asked.value, now)
             else:
                 self._again = min(self._again, self._rests_until[axis])
+
+    def _note_rest(self, motor: Motor, now: Ns) -> None:
+        """A motor that has come to rest stands for a tick at least: so often are its keys looked at."""
+        if not motor.idle:
+            self._rests_until[motor.name] = NEVER
+        elif self._rests_until[motor.name] >= NEVER:
+            self._rests_until[motor.name] = motor.next_tick(now)
 
     def _held(self, axis: str) -> Keys:
         """The slew keys of an axis that are held; none where they are no slew keys (E mode, NOSLEW)."""

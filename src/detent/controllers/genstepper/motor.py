@@ -239,12 +239,14 @@ class Motor:
     def set_keep(self, keep: int, now: Ns) -> None:
         """K: a stop under way ends there; a target move keeps the one that it began with."""
         self.keep = keep
+        self._raise_floor()
         if self.action in (Action.STOPPING, Action.REVERSING, Action.TURNING):
             self._stop_for(self.action, now)
 
     def set_slope(self, slope: int, now: Ns) -> None:
         """P: at once. A target move keeps the braking point that it computed (page 31)."""
         self.slope = slope
+        self._raise_floor()
         if self.action is Action.GOING:
             self._continue_go(now)
         elif self.action is Action.SLEWING:
@@ -337,6 +339,12 @@ class Motor:
     def _at_limit(self) -> bool:
         """Whether a stop is under way because a limit was met."""
         return self._floor != (0, 0)
+
+    def _raise_floor(self) -> None:
+        """A stop at a limit that P or K has made shorter is not made longer again by the next."""
+        if self._at_limit:
+            slope, keep = self._floor
+            self._floor = max(slope, self.slope), max(keep, self.keep)
 
     def _turn(self, direction: int) -> None:
         """From rest, in a direction."""

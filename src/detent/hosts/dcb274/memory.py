@@ -272,7 +272,14 @@ def blocks_of(lines: Sequence[str], address: int = 0) -> list[Block]:
             if place in NO_PROGRAM or place >= SIZE:
                 raise ValueError(f"line {number}: {text!r} would reach {place}: programs stand at 0-192 and 256-2047")
         address += LENGTHS[text[0]]
-    return [block for block in blocks if block.texts]
+    blocks = [block for block in blocks if block.texts]
+    taken: set[int] = set()
+    for block in blocks:
+        places = range(block.address, _behind(block) + 1)  # with its end mark
+        if not taken.isdisjoint(places):
+            raise ValueError(f"the block at {block.address}, with its end mark, reaches into one before; move it")
+        taken.update(places[:-1])
+    return blocks
 
 
 def hex_lines(memory: bytes) -> list[str]:
