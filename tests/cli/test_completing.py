@@ -1,11 +1,14 @@
 """Completion of a shell: what it knows beyond the options, and what it changes."""
 
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from detent.cli import application, main
 from detent.cli.completing import KNOWN, with_choices
+from detent.controllers.catalogue import MODELS
 
 
 def test_models_motors_straps_options_verbs_and_examples_are_completed(
@@ -27,6 +30,42 @@ def test_models_motors_straps_options_verbs_and_examples_are_completed(
     assert "fault" in (tmp_path / "script.fish").read_text()
     assert (home / ".bashrc").read_text() == "mine\n"
     assert [path.name for path in home.iterdir()] == [".bashrc"]
+
+
+def test_straps_and_options_are_those_of_the_model_that_was_typed(tmp_path: Path) -> None:
+    script = tmp_path / "script"
+    with pytest.raises(SystemExit):
+        main(["--install-completion", "--shell", "bash", "--output", str(script)])
+
+    def completed(*words: str) -> list[str]:
+        typed = " ".join(f"'{word}'" for word in words)
+        line = f"source {script}; COMP_WORDS=(detent {typed}); COMP_CWORD={len(words)}; _detent; echo ${{COMPREPLY[@]}}"
+        return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True).stdout.split()
+
+    for verb in ("serve", "run", "workbench", "epics"):
+        for name, model in MODELS.items():
+            assert completed(verb, name, "--strap", "") == [f"{strap}=" for strap in model.straps]
+            assert completed(verb, name, "--set", "") == [f"{option.name}=" for option in model.options]
+    every = {f"{strap}=" for model in MODELS.values() for strap in model.straps}
+    assert set(completed("run", "cell.toml", "--strap", "")) == every
+    assert completed("serve", "gs-c200", "--strap", "CH") == ["CHS="]
+    assert "qsh4218-41-10-035" in completed("tune", "gs-c200", "--motor", "qsh")
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_the_functions_of_the_other_shells_know_the_model(shell: str, tmp_path: Path) -> None:
+    if shutil.which(shell) is None:
+        pytest.skip(f"{shell} is not installed")
+    script = tmp_path / "script"
+    with pytest.raises(SystemExit):
+        main(["--install-completion", "--shell", shell, "--output", str(script)])
+    assert "@" not in [line for line in script.read_text().splitlines() if "_detent_strap" in line][-1]
+    line = {
+        "zsh": f"compdef() {{ }}; _arguments() {{ }}; . {script} 2>&-; print -l $(_detent_strap detent run dcb-274)",
+        "fish": f"source {script}; complete -C 'detent run dcb-274 --strap '",
+    }[shell]
+    done = subprocess.run([shell, "-c", line], capture_output=True, text=True, check=True)
+    assert sorted(word.split()[0] for word in done.stdout.splitlines()) == ["B1=", "B2=", "PARTY=", "PLC="]
 
 
 def test_the_choices_are_gone_again_and_each_has_its_parameter() -> None:

@@ -36,7 +36,13 @@ def test_what_is_found_comes_with_the_line_to_go_on_with(capsys: pytest.CaptureF
 def test_every_family_is_found_where_none_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     with served("dcb-274") as single, served("bs0610") as board:
         run(address(single), address(board), "--json")
-    axis, motors = json.loads(capsys.readouterr().out)
+    told = json.loads(capsys.readouterr().out)
+    axis, motors = told["found"]
+    assert [(port["port"], port["error"]) for port in told["looked_at"]] == [
+        (axis["port"], None),
+        (motors["port"], None),
+    ]
+    assert set(told["looked_for"]) == {"gs-c200", "dcb-274", "bs0610"}
     assert (axis["model"], axis["format"], axis["terminal"]) == (
         "dcb-274", None, f"detent terminal dcb-274 {axis['port']}",
     )  # fmt: skip

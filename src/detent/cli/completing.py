@@ -1,7 +1,8 @@
 """What a shell completes beyond the options: models, motors, straps, control verbs, the names of examples.
 
 The script is made once, from the choices that a parameter's type has. Those that are tables of Detent's stand in the
-types only while it is made: importing a verb must not bring the tables with it.
+types only while it is made: importing a verb must not bring the tables with it. Straps and options are those of the
+model that has been typed: their place is taken by a word, and that by a function of the shell.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -35,17 +36,26 @@ def wired_motors() -> list[str]:
 
 
 def straps() -> list[str]:
-    """Each strap of each controller, as it is begun: ``CHS=``."""
-    from detent.controllers.catalogue import MODELS
-
-    return sorted({f"{strap}=" for model in MODELS.values() for strap in model.straps})
+    """The word in the place of the straps of a model."""
+    return [_OF_THE_MODEL["strap"]]
 
 
 def settings() -> list[str]:
-    """Each option of each controller, as it is begun."""
+    """The word in the place of the options of a model."""
+    return [_OF_THE_MODEL["set"]]
+
+
+_OF_THE_MODEL: Final = {"strap": "@strap@", "set": "@set@"}
+
+
+def of_models() -> dict[str, dict[str, list[str]]]:
+    """The straps and the options of each model, as they are begun: ``CHS=``."""
     from detent.controllers.catalogue import MODELS
 
-    return sorted({f"{option.name}=" for model in MODELS.values() for option in model.options})
+    return {
+        "strap": {name: [f"{strap}=" for strap in model.straps] for name, model in MODELS.items()},
+        "set": {name: [f"{option.name}=" for option in model.options] for name, model in MODELS.items()},
+    }
 
 
 def control_verbs() -> list[str]:
@@ -75,6 +85,8 @@ KNOWN: Final[dict[tuple[str, str], Callable[[], list[str]]]] = {
     **{(verb, "strap"): straps for verb in VERBS},
     **{(verb, "set_"): settings for verb in VERBS},
     ("motor", "name"): motors,
+    ("tune", "motor"): motors,
+    ("compare-moves", "motor"): motors,
     ("wiring", "motor"): wired_motors,
     ("control", "words"): control_verbs,
     ("demo", "name"): example_names,
@@ -107,6 +119,31 @@ def with_choices() -> Iterator[None]:
             function.__annotations__ = before
 
 
+def narrowed(script: str, shell: str) -> str:
+    """The script of a shell with functions in the place of the words for straps and options, which know the model."""
+    made = []
+    for what, words in of_models().items():
+        place, function = _OF_THE_MODEL[what], f"_detent_{what}"
+        everything = sorted({word for some in words.values() for word in some})  # a cell file may have any model
+        if shell == "fish":
+            made += [f"function {function}", "    for word in $argv", "        switch $word"]
+            for name, some in words.items():
+                made += [f"            case {name}", f"                string split ' ' '{' '.join(some)}'"]
+                made += ["                return"]
+            made += ["        end", "    end", f"    string split ' ' '{' '.join(everything)}'", "end"]
+            script = script.replace(f"-a '{place}'", f"-a '({function} (commandline -opc))'")
+        else:
+            made += [f"{function}() {{", "  local word", '  for word in "$@"; do', '    case "$word" in']
+            made += [f"      {name}) echo {' '.join(some)}; return ;;" for name, some in words.items()]
+            made += ["    esac", "  done", f"  echo {' '.join(everything)}", "}"]
+            typed = '"${COMP_WORDS[@]}"' if shell == "bash" else "$words"
+            call = f"$({function} {typed})"
+            script = script.replace(f'("{place}")', f"({call})").replace(f"compadd -- '{place}'", f"compadd -- {call}")
+            script = script.replace(f"({place})", f"({call})")
+    first, _, rest = script.partition("\n")  # zsh looks for #compdef there
+    return "\n".join([first, *made, rest])
+
+
 def install(
     *, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path | None = None, force: bool = False
 ) -> None:
@@ -123,9 +160,11 @@ def install(
     force
         Write over a file that is there.
     """
+    from cyclopts.completion import detect_shell
+
     from detent.cli import application
     from detent.cli.endings import asked_wrongly, failed
-    from detent.outputs.files import InTheWay, check_outputs
+    from detent.outputs.files import InTheWay, check_outputs, write_whole
 
     try:
         check_outputs([output], asked=force)
@@ -134,7 +173,9 @@ def install(
     try:
         with with_choices():
             whole = application("*")
-            written = whole.install_completion(shell=shell, output=output, add_to_startup=output is None)
+            kind = shell or detect_shell()
+            written = whole.install_completion(shell=kind, output=output, add_to_startup=output is None)
+        write_whole(written, narrowed(written.read_text(encoding="utf-8"), kind).encode())
     except OSError as error:
         failed(f"{error.filename or output}: not written: {error.strerror or error}")
     except (ValueError, RuntimeError) as error:

@@ -38,7 +38,7 @@ def find(
     baud
         Try this rate alone. May be given several times.
     json
-        Print what was found as one line of JSON.
+        Print what was looked at and what was found as one line of JSON.
     """
     from detent.cli.endings import asked_wrongly, failed
     from detent.hosts.finding import USUAL
@@ -56,15 +56,17 @@ def find(
         asked_wrongly(error)
     if not searches:
         failed("this computer has no serial ports; name one: detent find /dev/ttyUSB0")
-    results = _look(searches)
+    results, failures = _look(searches)
     found = [(search, unit) for search, units in results for unit in units]
     if json:
-        print(json_text.dumps([_facts(search, unit) for search, unit in found]))
+        looked = [{"port": one.port, "device": one.what, "error": failures.get(one.port)} for one in searches]
+        facts = [_facts(search, unit) for search, unit in found]
+        print(json_text.dumps({"looked_at": looked, "looked_for": families, "found": facts}))
     else:
         _print(found)
-        if results and not found:
-            looked = ", ".join(search.port for search, _ in results)
-            print(f"Nothing was found at {looked}, looked at for {', '.join(families)}.")
+        silent = ", ".join(search.port for search, units in results if not units)
+        if silent:
+            print(f"Nothing was found at {silent}, looked at for {', '.join(families)}.")
             print("Is it switched on, are TXD and RXD crossed, does it run a program?")
     if not found:
         raise SystemExit(FAILED)
@@ -92,8 +94,8 @@ def _families(models: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(next(family for family in FORMATS if HOSTS[family] is host(model)) for model in models))
 
 
-def _look(searches: "list[Search]") -> "list[tuple[Search, list[Found]]]":
-    """What is found, port after port. What goes wrong at one is told, and the next is looked at."""
+def _look(searches: "list[Search]") -> "tuple[list[tuple[Search, list[Found]]], dict[str, str]]":
+    """What is found, port after port, and what went wrong, by port: it is told, and the next is looked at."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -106,6 +108,7 @@ def _look(searches: "list[Search]") -> "list[tuple[Search, list[Found]]]":
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
     results = []
+    failures: dict[str, str] = {}
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("looking", total=sum(search.seconds for search in searches))
         before = 0.0
@@ -117,11 +120,13 @@ def _look(searches: "list[Search]") -> "list[tuple[Search, list[Found]]]":
             try:
                 results.append((search, look(search.address, search.passes, watch)))
             except PortError as error:
-                print(f"detent: {error}", file=sys.stderr)
+                failures[search.port] = str(error)
             except (DriverError, Talks) as error:
-                print(f"detent: {search.port}: {error}", file=sys.stderr)
+                failures[search.port] = f"{search.port}: {error}"
+            if search.port in failures:
+                print(f"detent: {failures[search.port]}", file=sys.stderr)
             before += search.seconds
-    return results
+    return results, failures
 
 
 def _facts(search: Search, unit: "Found") -> dict[str, object]:
