@@ -211,3 +211,38 @@ def test_what_is_wrong_is_one_line_with_a_remedy(
     assert out == ""
     assert remedy in err
     assert err.count("\n") == 1
+
+
+LOOP = ("P 0", "+ 10", "W 0", "Z", "J 0 2", "P")  # prints three positions
+
+
+def test_what_a_program_prints_is_heard_until_it_ends(capsys: pytest.CaptureFixture[str]) -> None:
+    """Page 53: Z in a program prints the position; nothing is traced here."""
+    with served("dcb-274") as service:
+        port = address(service)
+        out, _ = told(capsys, "dcb-274", port, "--patience", "2", *LOOP, "G 0", "Z")
+        lines = out.splitlines()
+        assert lines[lines.index("> G 0") + 1 :][:5] == [
+            "<  (started)",
+            "| 10",
+            "| 20",
+            "| 30",
+            "< (the program has ended)",
+        ]
+        assert "30" in lines[-1]
+        out, _ = told(capsys, "dcb-274", port, "--patience", "2", "G 0", "--json")
+        (only,) = json.loads(out)["exchanges"]
+        assert (only["printed"], only["program"]) == (["40", "50", "60"], "the program has ended")
+
+
+def test_a_program_without_an_end_is_left_running_and_a_stop_behind_it_waits_for_nothing(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with served("dcb-274") as service:
+        port = address(service)
+        endless = ("P 0", "+ 10", "W 0", "Z", "G 0", "P")
+        out, _ = told(capsys, "dcb-274", port, "--patience", "2", *endless, "G 0", "--wait", "0.5")
+        assert "| 10\n" in out
+        assert "(the program still runs; ESC ends it" in out
+        out, _ = told(capsys, "dcb-274", port, "--patience", "2", "ESC", "G 0", "ESC", "Z")
+        assert "the program" not in out

@@ -1,7 +1,9 @@
 import io
 import json
 import sys
+import threading
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,7 @@ from prompt_toolkit.output import DummyOutput
 from tests.realtime.served import address, served
 
 from detent.cli import main
-from detent.cli.terminal import explained, fits, prompt
+from detent.cli.terminal import _typed, explained, fits, prompt
 from detent.workbench.words import words
 
 
@@ -156,3 +158,41 @@ def test_the_help_line_is_of_the_command_that_is_being_typed() -> None:
     assert explained(words("supersigma"), "move +5").startswith("move")
     assert explained(words("gs-c200"), "") == "Tab: the commands"
     assert explained(words("bs0610"), "12") == "Tab: the commands"
+
+
+@pytest.mark.parametrize("then", ["Z", "ESC"])
+def test_a_program_is_heard_before_the_next_line_of_a_pipe_unless_that_cuts_in(
+    then: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO(f"P 0\n+ 10\nW 0\nZ\nJ 0 2\nP\nG 0\n{then}\n"))
+    with served("dcb-274") as service:
+        terminal("dcb-274", address(service), "--patience", "2")
+    out = capsys.readouterr().out
+    assert ("| 10\n| 20\n| 30\n< (the program has ended)\n" in out) is (then == "Z")
+    assert ("<  (started)\n> ESC\n" in out) is (then == "ESC")
+    assert "\n| \n" not in out
+
+
+def test_what_nobody_asked_for_is_shown_while_nothing_is_typed(
+    keys: PipeInput, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Port:
+        def __init__(self) -> None:
+            self.came, self.heard = [b"", b"     12\r\n", b""], threading.Event()
+
+        def turn(self) -> nullcontext[None]:
+            return nullcontext()
+
+        def receive(self, timeout: float) -> bytes:
+            data = self.came.pop(0) if self.came else b""
+            if not self.came:
+                self.heard.set()
+                keys.send_text("Z\r\x04")
+            return data
+
+    class Unit:
+        port = Port()
+
+    session = prompt("dcb-274", words("dcb-274"))
+    assert list(_typed(session, Unit(), json=False)) == ["Z"]  # type: ignore[arg-type]
+    assert Unit.port.heard.is_set()

@@ -41,8 +41,8 @@ def send(
     raw
         The lines are bytes, with escapes like \r and \x1b, and go out as they are.
     wait
-        Seconds that a motion or a program may take that a line waits for (60). With --raw: in which answers are
-        collected (0.5).
+        Seconds that a motion may take that a line waits for, and that a program of a DCB-274 is listened to that a
+        line has started, unless it ends before (60). With --raw: in which answers are collected (0.5).
     json
         Print one line of JSON.
     unit
@@ -50,7 +50,7 @@ def send(
     """
     from detent.cli.endings import asked_wrongly
     from detent.cli.unit import unit as connected
-    from detent.hosts.typed import MOTION, leave, say
+    from detent.hosts.typed import MOTION, cuts_in, leave, listen, say
     from detent.hosts.typed import raw as exchange
 
     try:
@@ -72,24 +72,28 @@ def send(
                     if not json:
                         print(f"> {escaped(sent)}\n< {escaped(came)}", flush=True)
             else:
-                for line in lines:
+                seconds = MOTION if wait is None else wait
+                for line, then in zip(lines, [*lines[1:], ""], strict=True):
                     printed: list[str] = []
+
+                    def heard(text: str, printed: list[str] = printed) -> None:
+                        _tell([text], printed, json)
+
                     _tell(found.port.receive(0.0).decode("latin-1").splitlines(), printed, json)
-                    said = found.perform(
-                        say(
-                            found.driver,
-                            line,
-                            MOTION if wait is None else wait,
-                            lambda text, printed=printed: _tell([text], printed, json),  # type: ignore[misc]
-                        )
-                    )
+                    said = found.perform(say(found.driver, line, seconds, heard))
                     refused |= said.refused
                     facts: dict[str, object] = {
                         name: value for name, value in said._asdict().items() if value or name != "meanings"
                     }
-                    told.append({"sent": line, **facts, **({"printed": printed} if printed else {})})
+                    told.append({"sent": line, **facts})
                     if not json:
                         print(f"> {line}\n{shown(said)}", flush=True)
+                    if not cuts_in(found.driver, then):
+                        became = found.perform(listen(found.driver, seconds, heard))
+                        if became and not json:
+                            print(f"< ({became})", flush=True)
+                        told[-1] |= {"program": became} if became else {}
+                    told[-1] |= {"printed": printed} if printed else {}
                 if refused and (left := found.perform(leave(found.driver))):
                     print(f"detent: a line was refused: {left}", file=sys.stderr)
     finally:  # what was said before something failed has been said, and may have moved something

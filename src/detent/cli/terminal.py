@@ -1,7 +1,9 @@
 """The verb `terminal`: typing to a unit, with history, and with completion and help from its command table."""
 
 import json as json_text
+import queue
 import sys
+import threading
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
     Words: TypeAlias = tuple[Word, ...]
 
+LOOK = 0.2  # seconds between looks for what nobody has asked for
 EMULATED = UnitOptions(patience=10.0)  # what shares this process may take its time
 
 
@@ -66,36 +69,48 @@ def terminal(
         if where is None:
             where, unit = stack.enter_context(_emulated(model, unit)), EMULATED
         found = stack.enter_context(connected(model, where, unit))
+        piped: _Piped | None = None
         if sys.stdin.isatty():
             if not json:
                 emulated = "an emulated " if port is None else "the "
                 print(f"Talking to {emulated}{catalogue.model(model).title} at {where}. Tab completes, Ctrl-D ends.")
-            lines: Iterable[str] = _typed(prompt(model, known))
+            lines: Iterable[str] = _typed(prompt(model, known), found, json)
         else:
-            lines = _read(echo=not json)
+            lines = piped = _Piped(echo=not json)
         sound = True
         for line in lines:
             if line.strip():
-                sound &= _exchange(found, line, json)
+                sound &= _exchange(found, line, json, piped)
     if not sound and not sys.stdin.isatty():
         raise SystemExit(FAILED)
 
 
-def _exchange(unit: "Blocking", line: str, json: bool) -> bool:
-    """Say one line and print what comes of it. Whether it was taken."""
+def _exchange(unit: "Blocking", line: str, json: bool, piped: "_Piped | None") -> bool:
+    """Say one line and print what comes of it, until a program that it has started ends. Whether it was taken."""
     from detent.hosts.errors import DriverError
-    from detent.hosts.typed import MOTION, say
+    from detent.hosts.typed import MOTION, cuts_in, listen, say
+
+    printed: list[str] = []
+
+    def heard(text: str) -> None:
+        printed.append(escaped(text.strip().encode("latin-1")))
+        if not json:
+            print(f"| {printed[-1]}", flush=True)
+
+    def enough() -> bool:
+        return piped is not None and cuts_in(unit.driver, piped.next_line)
 
     try:
         unasked = unit.port.receive(0.0)
-        printed: list[str] = []
-
-        def heard(text: str) -> None:
-            printed.append(text)
-            if not json:
-                print(f"| {text}", flush=True)
-
+        for text in () if json else _texts(unasked):
+            print(f"< {text}  (came without being asked)")
         said = unit.perform(say(unit.driver, line, MOTION, heard))
+        if not json:
+            print(shown(said), flush=True)
+        patience = MOTION if piped is not None else float("inf")  # a person presses Ctrl-C
+        became = unit.perform(listen(unit.driver, patience, heard, enough))
+        if became and not json:
+            print(f"< ({became})", flush=True)
     except (DriverError, ValueError, OSError) as error:
         if json:
             print(json_text.dumps({"sent": line, "error": str(error)}), flush=True)
@@ -108,31 +123,79 @@ def _exchange(unit: "Blocking", line: str, json: bool) -> bool:
         return False
     if json:
         facts = {"sent": line, **said._asdict(), "printed": printed, "unasked": escaped(unasked)}
-        print(json_text.dumps(facts), flush=True)
-    else:
-        if unasked:
-            print(f"< {escaped(unasked)}  (came without being asked)")
-        print(shown(said), flush=True)
+        print(json_text.dumps(facts | ({"program": became} if became else {})), flush=True)
     return not said.refused
 
 
-def _read(*, echo: bool) -> Iterator[str]:
-    """The lines of standard input, each shown before it is sent."""
-    for line in sys.stdin:
-        if echo and line.strip():
-            print(f"> {line.strip()}")
-        yield line.rstrip("\r\n")
+class _Piped:
+    """The lines of standard input, each shown before it is sent; the one behind can be seen while one is said."""
+
+    def __init__(self, *, echo: bool) -> None:
+        self._echo = echo
+        self._lines: queue.Queue[str | None] = queue.Queue()
+        threading.Thread(target=self._read, name="standard input", daemon=True).start()
+
+    def _read(self) -> None:
+        for line in sys.stdin:
+            self._lines.put(line)
+        self._lines.put(None)
+
+    @property
+    def next_line(self) -> str:
+        """The line that will be said next, as far as it has come."""
+        with self._lines.mutex:
+            return (self._lines.queue[0] or "") if self._lines.queue else ""
+
+    def __iter__(self) -> Iterator[str]:
+        while (line := self._lines.get()) is not None:
+            if self._echo and line.strip():
+                print(f"> {line.strip()}")
+            yield line.rstrip("\r\n")
 
 
-def _typed(session: "PromptSession[str]") -> Iterator[str]:
-    """The lines that are typed, until Ctrl-D; Ctrl-C empties the line."""
+def _texts(came: bytes) -> list[str]:
+    """The lines in what came, for people."""
+    return [escaped(line.strip().encode("latin-1")) for line in came.decode("latin-1").splitlines() if line.strip()]
+
+
+def _typed(session: "PromptSession[str]", unit: "Blocking", json: bool) -> Iterator[str]:
+    """The lines that are typed, until Ctrl-D; Ctrl-C empties the line. What comes meanwhile is shown above it."""
     while True:
         try:
-            yield session.prompt()
+            with _overheard(unit, json):
+                line = session.prompt()
+            yield line
         except KeyboardInterrupt:
             continue
         except EOFError:
             return
+
+
+@contextmanager
+def _overheard(unit: "Blocking", json: bool) -> Iterator[None]:
+    """Show what a unit says while nobody has asked it anything: continuous reports, a program that a switch started."""
+    from prompt_toolkit.patch_stdout import patch_stdout
+
+    over = threading.Event()
+
+    def hear() -> None:
+        while not over.wait(LOOK):
+            try:
+                with unit.port.turn():
+                    came = unit.port.receive(0.0)
+            except OSError:
+                return  # the next line tells
+            for text in _texts(came):
+                print(json_text.dumps({"unasked": text}) if json else f"< {text}  (came without being asked)")
+
+    with patch_stdout():
+        thread = threading.Thread(target=hear, name="overhearing", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
 
 
 def prompt(model: str, known: "Words") -> "PromptSession[str]":
@@ -208,8 +271,6 @@ def _in_a_row(known: "Words") -> bool:
 @contextmanager
 def _emulated(model: str, options: UnitOptions) -> Iterator[str]:
     """A unit of this process, served in real time on a pseudo-terminal: its address."""
-    import threading
-
     from detent.cell.description import single
     from detent.cli.endings import asked_wrongly
     from detent.realtime.service import Service

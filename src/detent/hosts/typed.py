@@ -10,6 +10,7 @@ from functools import singledispatch
 from typing import Final, NamedTuple, TypeAlias
 
 from detent.hosts.dcb274 import Dcb274
+from detent.hosts.dcb274.ranges import LARGEST_ADDRESS
 from detent.hosts.errors import BadAnswer, MotionFailed, NoAnswer, Refused, Spoken
 from detent.hosts.exchange import Ask, Clear, Driver, Rest, Steps
 from detent.hosts.genstepper import Action, GenStepper, Reports
@@ -22,6 +23,7 @@ from detent.hosts.microbus import Report
 from detent.hosts.supersigma import LOW, Supersigma
 
 MOTION: Final = 60.0  # seconds that a motion may take that is waited for, unless the caller says more
+QUIET: Final = 0.3  # seconds without a word from a program, after which it is looked whether it runs still
 ANYTHING: Final = re.compile(r"(?s).+")
 SLOWEST_FRAME: Final = 12 * 11 / 110  # seconds: the longest answer of a GS-C200 at 110 baud
 
@@ -50,11 +52,41 @@ def unheard(line: str) -> None:
 def say(driver: Driver, line: str, seconds: float = MOTION, heard: Heard = unheard) -> Steps[Said]:
     """Say one line to the unit of `driver`; what it said. Raises DriverError, and ValueError for what is no line.
 
-    What the line waits for, the end of a motion or of a program, may take so many `seconds`; lines that a program
-    prints meanwhile go to `heard`.
+    What the line waits for, the end of a motion, may take so many `seconds`; lines that a program prints meanwhile go
+    to `heard`. A program that it starts is not waited for: see `listen`.
     """
     raise NotImplementedError(f"nobody knows how a line is typed to {driver.title}")
     yield
+
+
+def listen(driver: Driver, seconds: float, heard: Heard, enough: Callable[[], bool] = lambda: False) -> Steps[str]:
+    """Pass on what a program that a line has started prints, as it comes, until it ends; what became of it, in words.
+
+    At once, with "", where none runs that could print: only a DCB-274 in single mode has such. After so many
+    `seconds`, or when it is `enough`, it is left running.
+    """
+    if not isinstance(driver, Dcb274) or not driver.runs_a_program or enough():
+        return ""
+    began = None
+    while True:
+        now = (yield Rest(0.0)).at
+        yield from driver.overhear(QUIET)
+        lines = driver.printed()
+        if not lines:  # it may have ended: that is asked for
+            yield from driver.moving()
+            lines = driver.printed()
+        for line in lines:
+            heard(line)
+        if not driver.runs_a_program:
+            return "the program has ended"
+        began = now if began is None else began
+        if now - began > seconds or enough():
+            return "the program still runs; ESC ends it, @ slows down"
+
+
+def cuts_in(driver: Driver, line: str) -> bool:
+    """Whether a line is for a program that runs, and does not wait for its end."""
+    return isinstance(driver, Dcb274) and line.strip().upper() in _SINGLE
 
 
 def leave(driver: Driver) -> Steps[str]:
@@ -217,29 +249,22 @@ def _dcb274(driver: Dcb274, text: str, seconds: float, heard: Heard) -> Steps[Sa
     if listing and driver.mode == "single":
         found = yield from driver.listing(int(listing[1] or 0))
         return Said((*map(str, found.lines), str(found.end)), "" if found.lines else "no program there")
-    if driver.mode == "single" and (traced := re.fullmatch(r"G ?(\d*) 1", text)):
-        yield from driver.trace(int(traced[1] or 0), 0.0)
-        ended = yield from _listen(driver, seconds, heard)
-        return Said((), "the program has ended" if ended else "the program still runs; ESC ends it, @ slows down")
+    begun = re.fullmatch(r"G ?(\d*)(?: ([01]))?", text)
+    if begun and driver.mode == "single" and not driver.programming:
+        place = int(begun[1] or 0)
+        if begun[2] == "1":
+            yield from driver.trace(place, 0.0)
+        elif 0 <= place <= LARGEST_ADDRESS + 1 and not 192 < place < 256:
+            yield from driver.go(place)
+        else:
+            yield from driver.command(text, seconds)  # which is refused, in the unit's own way
+        for line in driver.printed():
+            heard(line)
+        return Said((), "started")
     answer = yield from driver.command(text, seconds)
     if re.fullmatch(r"P ?\d*", text):
         driver.programming = text != "P"
     return Said((answer,) if answer.strip() else (), "" if answer.strip() else "done")
-
-
-def _listen(driver: Dcb274, seconds: float, heard: Heard) -> Steps[bool]:
-    """Pass on what the program prints as it comes, for so many seconds at most; whether it has ended."""
-    began = None
-    while True:
-        running = yield from driver.moving()
-        for line in driver.printed():
-            heard(line)
-        if not running:
-            return True
-        now = (yield Rest(driver.poll)).at
-        began = now if began is None else began
-        if now - began > seconds:
-            return False
 
 
 _SINGLE: Final = {

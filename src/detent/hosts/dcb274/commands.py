@@ -284,6 +284,12 @@ class Commands(Unit):
         self._way.running = waited >= seconds
         return self.printed()
 
+    @operation
+    def overhear(self, seconds: float) -> Steps[None]:
+        """Take what a program prints, for so many `seconds` or until a line has come: `printed` has it then."""
+        if isinstance(self._way, SingleMode):
+            yield from self._way.overhear(seconds)
+
     def printed(self) -> list[str]:
         """The lines that programs have printed and nobody has taken yet, as far as they were heard."""
         if not isinstance(self._way, SingleMode):

@@ -56,6 +56,11 @@ class Dcb274(Memory):
         divide = yield from self._divisor()
         yield from self.find_home(self.home_rate * divide, direction)
 
+    @property
+    def runs_a_program(self) -> bool:
+        """Whether a program that this driver has started, or met, has not been seen to end, and could print."""
+        return self.mode == "single" and self._way.running
+
     @operation
     def moving(self) -> Steps[bool]:
         """Whether the motor moves (^), or a program runs that this driver has started."""

@@ -105,6 +105,7 @@ class SingleMode(Handshake):
     def __init__(self, patience: float) -> None:
         super().__init__("", patience)
         self.printed: list[str] = []
+        self._begun = ""  # of a line that a program is printing
         self.examined = ""
         self.programming = False
         self._typed = False  # a line went unanswered
@@ -184,11 +185,15 @@ class SingleMode(Handshake):
     def over(self) -> Steps[bool]:
         """X is in no line that a program prints, so its echo is found among them; without one a program runs."""
         answer = yield Ask(b"X", until(b"X"), self.patience)
-        self._print(answer.data.removesuffix(b"X"))
+        self._print(answer.data.removesuffix(b"X"), whole=answer.whole)
         if not answer.whole:
             return False
         yield Ask(CR, until(b"\r\n"), self.patience)
         return True
+
+    def overhear(self, seconds: float) -> Steps[None]:
+        """What a program prints, up to the end of a line."""
+        self._print((yield Ask(b"", until(b"\n"), seconds)).data)
 
     def escape(self) -> Steps[None]:
         """ESC is answered by ``#`` CR LF (page 33), of other firmware perhaps by ``#`` alone.
@@ -226,8 +231,12 @@ class SingleMode(Handshake):
             if not answer.whole:
                 return
 
-    def _print(self, data: bytes) -> None:
-        self.printed += [line for line in data.decode("latin-1").replace("\r", "\n").split("\n") if line]
+    def _print(self, data: bytes, *, whole: bool = False) -> None:
+        """Keep the lines of what a program has printed; what of the last one has come waits for its rest."""
+        *lines, self._begun = (self._begun + data.decode("latin-1")).replace("\r", "\n").split("\n")
+        if whole:
+            lines, self._begun = [*lines, self._begun], ""
+        self.printed += filter(str.strip, lines)
 
 
 class PartyLine(Handshake):
