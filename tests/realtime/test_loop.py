@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 import pytest
-from tests.realtime.ticking import LOOK, Client, TickingCell, Wall, look
+from tests.realtime.ticking import LOOK, UNREAL, Client, TickingCell, Wall, look
 
 from detent.realtime.loop import LONGEST, Loop
 from detent.realtime.pace import Pace
@@ -62,7 +62,7 @@ def test_a_day_takes_no_memory() -> None:
 
 
 def test_what_a_client_sends_reaches_the_line_at_the_present_and_is_answered_in_the_same_step() -> None:
-    wall, cell, client = Ready(1000), TickingCell(None), Client()
+    wall, cell, client = Ready(UNREAL), TickingCell(None), Client()
     loop = Loop(cell, Pace(3, clock=wall), [(0, client)], wait=wall.wait)
     wall.now += 1_000
     client.inbox.append(b"F\r")
@@ -73,7 +73,7 @@ def test_what_a_client_sends_reaches_the_line_at_the_present_and_is_answered_in_
 
 
 def test_a_deadline_comes_before_the_bytes_that_arrive_after_it() -> None:
-    wall, cell, client = Ready(1000), TickingCell(MS), Client()
+    wall, cell, client = Ready(UNREAL), TickingCell(MS), Client()
     loop = Loop(cell, Pace(clock=wall), [(0, client)], wait=wall.wait)
     wall.now += MS + 1
     client.inbox.append(b"x")
@@ -83,8 +83,8 @@ def test_a_deadline_comes_before_the_bytes_that_arrive_after_it() -> None:
 
 
 def test_every_endpoint_of_a_line_hears_it_and_no_other_does() -> None:
-    wall, cell = Ready(1000), TickingCell(None, lines=2)
-    talking, beside, elsewhere = Client(1000), Client(1001), Client(1002)
+    wall, cell = Ready(UNREAL), TickingCell(None, lines=2)
+    talking, beside, elsewhere = Client(UNREAL), Client(UNREAL + 1), Client(UNREAL + 2)
     loop = Loop(cell, Pace(clock=wall), [(1, talking), (1, beside), (0, elsewhere)], wait=wall.wait)
     talking.inbox.append(b"V1\r")
     loop.step()
@@ -93,7 +93,7 @@ def test_every_endpoint_of_a_line_hears_it_and_no_other_does() -> None:
 
 
 def test_bytes_of_eight_bits_pass_as_they_are() -> None:
-    wall, cell, client = Ready(1000), TickingCell(None), Client()
+    wall, cell, client = Ready(UNREAL), TickingCell(None), Client()
     loop = Loop(cell, Pace(clock=wall), [(0, client)], wait=wall.wait)
     client.inbox.append(b"\x80\xff\x00")
     loop.step()
@@ -152,7 +152,7 @@ class Slow(TickingCell):
 
 
 def test_a_cell_that_cannot_keep_pace_still_serves_its_clients_and_its_lateness_shows_it() -> None:
-    wall = Ready(1000)
+    wall = Ready(UNREAL)
     cell, client = Slow(wall), Client()
     pace = Pace(clock=wall)
     loop = Loop(cell, pace, [(0, client)], wait=wall.wait)

@@ -9,6 +9,7 @@ from detent.realtime.pace import WallNs
 from detent.ticks import US, Ns
 from detent.uart import Chars, characters
 
+UNREAL = 1_000_000  # descriptors from here on are open nowhere
 LOOK = 30 * US  # what a look at the descriptors costs
 
 
@@ -74,11 +75,11 @@ class TickingCell:
 
 
 class Client:
-    """An endpoint without a descriptor: `inbox` is read when the loop is told that 1000 is readable."""
+    """An endpoint without a descriptor: `inbox` is read when the loop is told that `descriptor` is readable."""
 
     kind, address, dropped = "client", "nowhere", 0
 
-    def __init__(self, descriptor: int = 1000) -> None:
+    def __init__(self, descriptor: int = UNREAL) -> None:
         self.descriptor = descriptor
         self.inbox: list[bytes] = []
         self.outbox = b""
@@ -120,4 +121,5 @@ def look(
     readers: Sequence[int], writers: Sequence[int], _: Sequence[int], seconds: float | None
 ) -> tuple[list[int], list[int], list[int]]:
     """A `select` that never sleeps for long, so that a test can look after each step whether it has what it wants."""
+    readers = [descriptor for descriptor in readers if descriptor < UNREAL]
     return select.select(readers, writers, (), 0.05 if seconds is None else min(seconds, 0.05))

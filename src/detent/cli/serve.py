@@ -91,6 +91,7 @@ def serve(
     from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost
     from detent.realtime.images import Images, ImagesUnusable, default_folder
     from detent.realtime.notify import Notifier
+    from detent.realtime.polling import allow_many
     from detent.realtime.service import Service, models
 
     links = list(pty) if pty is not None else None
@@ -111,6 +112,7 @@ def serve(
     except (Problem, ImagesUnusable) as error:
         asked_wrongly(error)
     notifier = Notifier(os.environ)
+    allow_many()
     try:
         try:
             if wait:

@@ -28,7 +28,7 @@ from urllib.parse import SplitResult, parse_qsl, urlsplit
 import detent
 from detent.realtime import http1, openapi, verbs
 from detent.realtime.control import Ending
-from detent.realtime.endpoints.endpoint import EndpointError
+from detent.realtime.endpoints.endpoint import EndpointError, descriptors_suffice
 from detent.realtime.endpoints.tcp import TcpAddress
 from detent.realtime.verbs import Answer, AskedWrongly, Json
 
@@ -73,7 +73,11 @@ class HttpControl:
                 f"{address} is open to other computers: give --token TEXT or ${TOKEN}, or listen on 127.0.0.1"
             )
         try:
-            listener = _listen(address)
+            with descriptors_suffice():
+                listener = _listen(address)
+                self._loop = asyncio.new_event_loop()
+        except EndpointError:
+            raise
         except (OSError, UnicodeError) as error:
             reason = getattr(error, "strerror", None) or error
             raise EndpointError(
@@ -83,7 +87,6 @@ class HttpControl:
         self.address = TcpAddress(str(host), int(port))
         self._control = control
         self._clients = _Clients(control, token or "")
-        self._loop = asyncio.new_event_loop()
         self._loop.set_exception_handler(_of_a_connection)
         self._ending = asyncio.Event()
         self._thread = threading.Thread(target=self._run, args=(listener,), name="control", daemon=True)

@@ -4,13 +4,12 @@ A wake-up does everything that it makes possible: the cell catches up with the c
 their lines, and what the hosts of the lines heard goes out. Characters count as sent when they are read; the
 line then gives them their time. Then the loop sleeps until the next deadline of the cell or the next byte.
 
-`select` is used because it takes microseconds: epoll and poll round a timeout up to whole milliseconds. What
-remains after it (`EARLY`) is spent looking at the descriptors again and again.
+It sleeps to the microsecond (`realtime.polling`). What remains after that (`EARLY`) is spent looking at the descriptors
+again and again.
 """
 
 import contextlib
 import os
-import select
 import signal
 import threading
 from collections import defaultdict, deque
@@ -21,6 +20,7 @@ from time import monotonic_ns
 from typing import Any, Protocol, TypeAlias, TypeVar
 
 from detent.lines.line import Heard
+from detent.realtime import polling
 from detent.realtime.endpoints.endpoint import Endpoint, Listener
 from detent.realtime.pace import Pace, WallNs
 from detent.ticks import MS, SECOND, US, Ns
@@ -118,7 +118,7 @@ class Loop:
         endpoints: Sequence[tuple[int, Endpoint]],
         *,
         patience: Sequence[Ns] | None = None,
-        wait: Wait = select.select,
+        wait: Wait = polling.wait,
         companion: Companion | None = None,
         timers: Sequence[Timer] = (),
     ) -> None:
@@ -196,13 +196,16 @@ class Loop:
     def step(self) -> None:
         """Wait until there is something to do, then do it."""
         cell, clock, lines = self._cell, self._pace.clock, self._cell.lines
-        readers: dict[int, tuple[int, Endpoint] | None] = {self._woken: None}
+        readers: dict[int, list[tuple[int, Endpoint]]] = {self._woken: []}
         writers: dict[int, Endpoint] = {}
         for pair in self._endpoints:
             line, endpoint = pair
             room = lines[line].host_busy_until - cell.now <= self._patience[line]
             for descriptor in endpoint.reading(room):
-                readers[descriptor] = pair
+                if descriptor in readers:
+                    readers[descriptor].append(pair)  # several may share one that tells who comes and goes
+                else:
+                    readers[descriptor] = [pair]
             for descriptor in endpoint.writing():
                 writers[descriptor] = endpoint
         companion = self._companion
@@ -226,16 +229,15 @@ class Loop:
         for descriptor in readable:
             if descriptor in beside[0]:
                 continue
-            reader = readers[descriptor]
-            if reader is None:
+            if descriptor == self._woken:
                 os.read(self._woken, 64)
                 self._do_asked()
                 cell.run_to(cell.now)  # whoever stands between takes note of what was done to it
                 continue
-            line, endpoint = reader
-            data = endpoint.receive(descriptor, wall)
-            if data:
-                cell.send(line, data)
+            for line, endpoint in readers[descriptor]:
+                data = endpoint.receive(descriptor, wall)
+                if data:
+                    cell.send(line, data)
         for descriptor in writable:
             if descriptor not in beside[1]:
                 writers[descriptor].flush()

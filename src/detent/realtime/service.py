@@ -20,7 +20,8 @@ from detent.pins import Level
 from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.replies import HeldStores
-from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
+from detent.realtime.endpoints.endpoint import Endpoint, EndpointError, descriptors_suffice
+from detent.realtime.endpoints.opened import Openings
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.guarded import Guarded
 from detent.realtime.images import Images
@@ -75,7 +76,7 @@ class Service:
             raise Problem("", "pace", "real pins keep real time: leave the pace at 1")
         self._company = contextlib.ExitStack()
         self._cleanup = contextlib.ExitStack()
-        with contextlib.ExitStack() as opening:
+        with descriptors_suffice(), contextlib.ExitStack() as opening:
             stores, inputs, opened = None, None, None
             if real is not None:
                 opened = Opened(description, read, real)
@@ -233,6 +234,7 @@ def open_endpoints(
         raise Problem(description.file, "units", "there is no unit with a serial line to serve")
     outside = [number for number, line in enumerate(cell.lines) if not line.hosted]
     opened: list[tuple[int, Endpoint]] = []
+    openings = Openings()
     for place, number in enumerate(outside):
         name = names[number]
         found = placed.get(name) if placed else None
@@ -245,9 +247,11 @@ def open_endpoints(
                 with contextlib.suppress(EndpointError, OSError):  # another has it: then without
                     there = link(name)
                     there.parent.mkdir(parents=True, exist_ok=True)
-                    endpoint = EndpointSpec("pty", str(there)).open(name, line.format, line.parting, echoes=echoes)
+                    endpoint = EndpointSpec("pty", str(there)).open(
+                        name, line.format, line.parting, echoes=echoes, openings=openings
+                    )
             if endpoint is None:
-                endpoint = one.open(name, line.format, line.parting, echoes=echoes)
+                endpoint = one.open(name, line.format, line.parting, echoes=echoes, openings=openings)
             opening.callback(endpoint.close)
             opened.append((number, endpoint))
     return opened

@@ -37,7 +37,7 @@ PAGES: tuple[Page, ...] = (
 )  # fmt: skip
 """The pages in the order of their tabs."""
 
-PATIENCE = 2  # s that open windows are given when the server ends
+PATIENCE = 1  # s that open windows are given when the server ends
 
 
 def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place, state: Path) -> tuple[Guard, Units]:

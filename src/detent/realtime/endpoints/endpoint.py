@@ -1,8 +1,9 @@
 """What every endpoint answers to the loop, and the bytes that wait for a client."""
 
 import contextlib
+import errno
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol, runtime_checkable
 
 from detent.lines.line import Heard
@@ -10,11 +11,25 @@ from detent.realtime.pace import WallNs
 from detent.uart import Chars
 
 MOST_READ = 256  # bytes taken from a client in one wake-up: a flood leaves time for everybody else
+OUT_OF_DESCRIPTORS = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)  # what the system has no more of
 MOST_WAITING = 4_096  # bytes kept for a client that does not read
 
 
 class EndpointError(OSError):
     """An endpoint that cannot be opened as asked. The text says what is wrong and what to do."""
+
+
+@contextlib.contextmanager
+def descriptors_suffice() -> Iterator[None]:
+    """What is opened meanwhile and finds no descriptor left is an EndpointError with the remedy."""
+    try:
+        yield
+    except OSError as error:
+        cause = error.__cause__ if isinstance(error, EndpointError) else error
+        if not isinstance(cause, OSError) or cause.errno not in (errno.EMFILE, errno.ENFILE):
+            raise
+        whose = "the system has" if cause.errno == errno.ENFILE else "this process may have"
+        raise EndpointError(f"{whose} no more open files: raise the limit (ulimit -n), or serve fewer lines") from error
 
 
 class EndpointLost(OSError):

@@ -8,7 +8,6 @@ to one that nobody uses. The kernel tells of settings in packet mode, with EXTPR
 
 import fcntl
 import os
-import pty
 import stat
 import struct
 import sys
@@ -19,7 +18,7 @@ from itertools import count
 from pathlib import Path
 
 from detent.realtime.endpoints.endpoint import MOST_READ, EndpointError, Outgoing
-from detent.realtime.endpoints.opened import Opened
+from detent.realtime.endpoints.opened import Opened, Openings
 from detent.realtime.pace import WallNs
 from detent.uart import Chars
 
@@ -39,13 +38,14 @@ class PseudoTerminal:
 
     kind = "pty"
 
-    def __init__(self, link: Path | None = None, parting: Chars = b"") -> None:
+    def __init__(self, link: Path | None = None, parting: Chars = b"", openings: Openings | None = None) -> None:
         """`parting` is what the line hears when the last client leaves, if it said something.
 
+        Several in one loop may share `openings`, by which they are told who comes and goes.
         Raises EndpointError if `link` cannot be made, is something else than a link, or is served by another.
         """
         try:
-            self._ours, self._theirs = pty.openpty()
+            self._ours, self._theirs = os.openpty()
         except OSError as error:
             raise EndpointError(f"no pseudo-terminal to be had: {error.strerror or error}") from error
         self._parting = parting
@@ -61,7 +61,7 @@ class PseudoTerminal:
             if _TELLS:
                 fcntl.ioctl(self._ours, termios.TIOCPKT, struct.pack("i", 1))
                 _unsettle(self._theirs)
-            self._clients = Opened(self._device)
+            self._clients = Opened(self._device, openings)
             if link is not None:
                 _point(link, self._device)
                 self._link = link

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from detent.realtime.endpoints.endpoint import Endpoint
+from detent.realtime.endpoints.opened import Openings
 from detent.realtime.endpoints.pty import PseudoTerminal
 from detent.realtime.endpoints.rfc2217 import Rfc2217Port
 from detent.realtime.endpoints.serialport import SerialPort
@@ -55,15 +56,17 @@ class EndpointSpec(NamedTuple):
             )
         return self
 
-    def open(self, name: str, form: Format, parting: Chars = b"", *, echoes: bool = False) -> Endpoint:
+    def open(
+        self, name: str, form: Format, parting: Chars = b"", *, echoes: bool = False, openings: Openings | None = None
+    ) -> Endpoint:
         """The endpoint, for the line `name` with characters of `form`. Raises EndpointError.
 
         `parting` is what the line hears when a client leaves, as far as that is seen. One that `echoes` sends back what
-        is typed.
+        is typed. Those of one loop may share `openings`.
         """
         match self.kind:
             case "pty":
-                return PseudoTerminal(Path(self.where) if self.where else None, parting)
+                return PseudoTerminal(Path(self.where) if self.where else None, parting, openings)
             case "tcp":
                 return TcpPort(TcpAddress.parse(self.where), name, parting)
             case "rfc2217":

@@ -6,11 +6,12 @@ import socket
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from detent.realtime.endpoints.endpoint import MOST_READ, EndpointError, Outgoing
+from detent.realtime.endpoints.endpoint import MOST_READ, OUT_OF_DESCRIPTORS, EndpointError, Outgoing
 from detent.realtime.pace import WallNs
 from detent.ticks import SECOND
 from detent.uart import Chars
 
+DEAF: WallNs = SECOND  # how long no client is let in when there is no descriptor left for one
 LINGER: WallNs = SECOND  # a client that has said all it had to say may still wait for the answer
 _BACKLOG = 8
 _KEEPALIVE = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}  # seconds, seconds, times
@@ -54,6 +55,7 @@ class TcpPort:
         self._client: socket.socket | None = None
         self._peer = ""
         self._until: WallNs | None = None  # the client has said everything, and goes then
+        self._deaf_until: WallNs | None = None  # nobody is let in before
         self._parting = parting
         self._said = False  # the client has said something
         self._owed = False  # it has left since, or has said everything, and the line has not heard so
@@ -69,26 +71,32 @@ class TcpPort:
 
         In this order, so that a client that leaves makes room for one that comes in the same wake-up.
         """
+        listening = (self._listener.fileno(),) if self._deaf_until is None else ()
         if room and self._client is not None and self._until is None:
-            return (self._client.fileno(), self._listener.fileno())
-        return (self._listener.fileno(),)
+            return (self._client.fileno(), *listening)
+        return listening
 
     def writing(self) -> Sequence[int]:
         """The client, while bytes wait."""
         return (self._client.fileno(),) if self._client is not None and self._outgoing else ()
 
     def deadline(self) -> WallNs | None:
-        """When a client that has said everything goes."""
-        return self._until
+        """When a client that has said everything goes, or others are let in again."""
+        if self._deaf_until is None or (self._until is not None and self._until < self._deaf_until):
+            return self._until
+        return self._deaf_until
 
     def due(self, wall: WallNs) -> None:
-        """The client that has said everything goes."""
-        self._leave()
+        """One of both."""
+        if self._deaf_until is not None and self._deaf_until <= wall:
+            self._deaf_until = None
+        if self._until is not None and self._until <= wall:
+            self._leave()
 
     def receive(self, descriptor: int, wall: WallNs) -> Chars:
         """A new client, or what the client sent; and that a client has left, where that means something."""
         if descriptor == self._listener.fileno():
-            self._accept()
+            self._accept(wall)
             return self._parted()
         if self._client is None or descriptor != self._client.fileno():
             return self._parted()  # it left in this very wake-up
@@ -149,11 +157,13 @@ class TcpPort:
     def _write(self, data: bytes) -> int:
         return self._client.send(data) if self._client is not None else len(data)
 
-    def _accept(self) -> None:
+    def _accept(self, wall: WallNs) -> None:
         try:
             client, address = self._listener.accept()
-        except OSError:
-            return  # it went away before it was let in, or there is no descriptor left for it
+        except OSError as error:
+            if error.errno in OUT_OF_DESCRIPTORS:
+                self._deaf_until = wall + DEAF  # it stays at the door: to look again at once would be for nothing
+            return  # else it went away before it was let in
         peer = str(TcpAddress(address[0], address[1]))
         if self._client is not None and self._until is None and not _gone(self._client):
             _refuse(client, f"{self._name} is in use by {self._peer}; one client at a time, try again later")
