@@ -1,6 +1,6 @@
 """``python -m detent``: the same as the command ``detent``."""
 
-from detent.cli import main
+from detent.cli import command
 
 if __name__ == "__main__":
-    main()
+    command()
