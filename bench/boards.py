@@ -14,8 +14,8 @@ import numpy as np
 from bench.rows import Row, print_table
 from detent.axis import MotionStarted
 from detent.cell.build import build
-from detent.cell.delivery import no_store
 from detent.cell.description import parse
+from detent.cell.outside import no_store
 from detent.outputs.steps import Error, Runs, Scale
 from detent.pulses import Accelerating, Train
 from detent.ramps import constant_acceleration, tick_accumulator

@@ -4,7 +4,7 @@ A level is the plain integer 0 or 1, as the manuals print it. A `Pin` is one row
 pin table; the netlist, the help, the documentation and the recordings read the same rows.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple, Protocol, TypeAlias
 
@@ -50,6 +50,11 @@ class Pin(NamedTuple):
     kind: PinKind
     help: str
     rest: Level = HIGH
+
+
+def find_pin(pins: Sequence[Pin], name: str) -> Pin | None:
+    """The pin of that name."""
+    return next((pin for pin in pins if pin.name == name), None)
 
 
 class PulseOutput(NamedTuple):

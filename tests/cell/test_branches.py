@@ -8,7 +8,7 @@ from tests.cell.test_copies import ACTIONS, DESCRIPTION, FILES
 from tests.cell.test_history import SETTINGS, Mirror, action, example, look
 
 from detent.cell.actions import Break, SetPin, SetSwitch, Type
-from detent.cell.breakage import StuckSwitch
+from detent.cell.faults import StuckSwitch
 from detent.cell.history import MOST_BRANCHES, History
 from detent.cell.stores import Stores
 from detent.ticks import MS, SECOND

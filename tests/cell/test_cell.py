@@ -4,7 +4,7 @@ import pytest
 from tests.cell.cells import cell, edges, pulses
 
 from detent.cell.build import build
-from detent.cell.delivery import Oscillation
+from detent.cell.circuit import Oscillation
 from detent.cell.description import single
 from detent.cell.recording import InputSet, Received
 from detent.controllers.device import Powered, StoreImage

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from tests.cell.cells import cell, edges
 
 from detent.cell.actions import Break, TimedAction
-from detent.cell.breakage import Fault, OnLine, StuckPin, StuckSwitch, SupplyDip, WriteFailure
 from detent.cell.cell import Cell
+from detent.cell.faults import Fault, OnLine, StuckPin, StuckSwitch, SupplyDip, WriteFailure
 from detent.lines.faults import BitErrors, CableOut, Delay, LostCharacters
 from detent.lines.line import Line
 from detent.ticks import MS, SECOND
@@ -88,9 +88,9 @@ def test_a_stuck_switch_stays_while_the_axis_moves_on_and_is_right_when_mended()
     assert answers(made, "+100") == ["Y"]
     made.run_to(made.now + 2 * SECOND)
     assert made.controller("a").status(made.now).position == 100
-    assert made.given(0, "UI1") == 1
+    assert made.circuit.given(0, "UI1") == 1
     made.mend(fault)
-    assert made.given(0, "UI1") == 0
+    assert made.circuit.given(0, "UI1") == 0
     assert answers(made, "V2") == ["V60"], "UI1 is 0 now"
 
 
@@ -154,9 +154,9 @@ def test_after_a_dip_the_supply_is_as_its_switch_is_then(on: bool) -> None:
     made.power("a", False)
     if on:
         made.power("a", True)
-    assert not made.supplied(0), "no switch ends a dip"
+    assert not made.circuit.supplied(0), "no switch ends a dip"
     made.run_to(made.now + 1 * SECOND)
-    assert made.supplied(0) == on
+    assert made.circuit.supplied(0) == on
     assert answers(made, "V1") == (["V0"] if on else [])
 
 
@@ -247,7 +247,7 @@ def do(target: Cell, actions: list) -> None:
 def all_of(target: Cell) -> list:
     assert target.recording is not None
     heard = [list(line.heard) for line in target.lines]
-    return [list(target.recording), heard, [net.level for net in target.nets], target.now, target.next_event()]
+    return [list(target.recording), heard, [net.level for net in target.circuit.nets], target.now, target.next_event()]
 
 
 SETTINGS = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))

@@ -407,7 +407,7 @@ def test_a_loop_without_end_in_one_instant_stops_it_and_one_can_go_back() -> Non
 
 
 def _oscillation() -> Exception:
-    from detent.cell.delivery import Oscillation
+    from detent.cell.circuit import Oscillation
 
     return Oscillation("a.UO1, b.UI1 change each other without end")
 

@@ -99,7 +99,8 @@ def told(of: Cell) -> dict[str, int]:
     """The levels of the contacts as the wires have them."""
     index = of.wiring.names.index("motor")
     names = rotor(of).contact_names
-    return {name: of.nets[net].levels[index, name] for name in names if (net := of.net_driven(index, name)) is not None}
+    nets = {name: net for name in names if (net := of.circuit.net_driven(index, name)) is not None}
+    return {name: of.circuit.nets[net].levels[index, name] for name, net in nets.items()}
 
 
 def real(of: Cell, now: Ns) -> dict[str, int | None]:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.hosts.test_supersigma_cells import positions, robot
 
-from detent.cell.breakage import OnLine
+from detent.cell.faults import OnLine
 from detent.hosts.errors import DriverError, MotionFailed
 from detent.hosts.supersigma import BlockingCcu, BlockingSupersigma, Ccu, Supersigma
 from detent.lines.faults import UNITS, LostCharacters

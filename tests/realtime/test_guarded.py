@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from tests.cell.cells import cell as built
 
-from detent.cell.delivery import Oscillation
+from detent.cell.circuit import Oscillation
 from detent.cell.description import parse
 from detent.realtime.guarded import Guarded
 from detent.realtime.picture import whole_state
@@ -50,13 +50,13 @@ def test_what_a_unit_raises_stops_its_cell_with_a_report_and_nothing_else(how: s
 
 def test_an_oscillation_names_its_pins_and_what_drives_them(monkeypatch: pytest.MonkeyPatch) -> None:
     made = built('[units.a]\nmodel = "gs-c200"\n[[wires]]\nfrom = "a.UO1"\nto = ["a.UI1", "a.UI2"]\n')
-    monkeypatch.setattr("detent.cell.delivery.MOST_DELIVERIES", 6)
-    net = made.net_driven(0, "UO1")
+    monkeypatch.setattr("detent.cell.circuit.MOST_DELIVERIES", 6)
+    net = made.circuit.net_driven(0, "UO1")
     assert net is not None
 
     def swing() -> None:
         for n in range(9):
-            made.drive(net, (0, "UO1"), n % 2)
+            made.circuit.drive(net, (0, "UO1"), n % 2)
 
     with pytest.raises(
         Oscillation, match=r"a\.UI1 \(driven by a\.UO1\), a\.UI2 \(driven by a\.UO1\) change without end"

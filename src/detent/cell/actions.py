@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, TypeAlias
 
-from detent.cell.breakage import Fault
+from detent.cell.faults import Fault
 from detent.pins import Level
 from detent.ticks import Ns
 from detent.uart import Chars

@@ -10,8 +10,8 @@ from detent.assembler import Assembly, AssemblyFailed, ImageError, assemble
 from detent.cell import real_pins
 from detent.cell.actions import Power, SetSwitch, TimedAction, Type
 from detent.cell.cell import Cell
-from detent.cell.delivery import Store, Typed, no_store, nobody_asks
 from detent.cell.description import Description, Problem, Unit
+from detent.cell.outside import Store, Typed, no_store, nobody_asks
 from detent.cell.parts import PARTS, Part
 from detent.cell.switches import AxisSwitch, Switch
 from detent.cell.wiring import Wiring
@@ -521,7 +521,7 @@ class _Builder:
                     raise self.problem(f"units.{name}", f"its stored image is damaged: {error}") from None
         hosts = [entry.host for entry in self.description.lines.values() if entry.host is not None]
         order = (*hosts, *(name for name in units if name not in hosts))  # axes look at PARTY at power-on
-        cell.supply_all([cell.unit(name) for name in order if units[name].powered])
+        cell.circuit.supply_all([cell.unit(name) for name in order if units[name].powered])
         for name, assembly in programs.items():
             self.controller(name).load(assembly.image, assembly.base, cell.now)
         cell.start_all(programs)

@@ -1,7 +1,7 @@
 """The scheduler: who is due when, and what is done to the cell from outside.
 
 Order within one instant (the contract of `controllers.device`): units that are due are advanced in file order, switches
-after them; then what they did is delivered (`cell.delivery`).
+after them; then what they did is delivered (`cell.circuit`).
 """
 
 import copy
@@ -26,13 +26,15 @@ from detent.cell.actions import (
     TimedAction,
     Type,
 )
-from detent.cell.breakage import Fault, find_pin
-from detent.cell.delivery import Delivery, Store, Typed, no_store, nobody_asks
-from detent.cell.recording import Log, Received, Recording
+from detent.cell.breakage import Breakage
+from detent.cell.circuit import Circuit
+from detent.cell.faults import Fault
+from detent.cell.outside import Outside, Store, Typed, no_store, nobody_asks
+from detent.cell.recording import Log, Recording
 from detent.cell.wiring import SerialUnit, Wiring
 from detent.controllers.device import Controller, Device
 from detent.lines.line import Line
-from detent.pins import Level, Net, PinKind
+from detent.pins import Level, Net, PinKind, find_pin
 from detent.ticks import NEVER, Ns, show_duration
 from detent.uart import Chars
 
@@ -51,8 +53,12 @@ def _switches_on(action: TimedAction) -> bool:
     return isinstance(action.what, Power) and action.what.on and not action.outside
 
 
-class Cell(Delivery):
-    """Everything in one virtual time. Made by `detent.cell.build`."""
+class Cell:
+    """Everything in one virtual time. Made by `detent.cell.build`.
+
+    It knows the time, the script and what is done from outside; `circuit` are its parts and what joins them, `faults`
+    what is broken of them.
+    """
 
     def __init__(
         self,
@@ -67,7 +73,8 @@ class Cell(Delivery):
         typed: Typed = nobody_asks,
     ) -> None:
         recording = Recording(wiring.names[: wiring.units]) if record else None
-        super().__init__(wiring, parts, nets, lines, store, recording, typed)
+        self.circuit = Circuit(wiring, parts, nets, lines, Outside(store, typed), recording)
+        self.faults = Breakage(self.circuit)
         self.journal: Log[TimedAction] = Log()  # what was done from outside, if it records: `build` takes it
         self.journaling = False  # see `begin`
         self._script = Script(sorted(script, key=lambda action: action.at))
@@ -96,7 +103,7 @@ class Cell(Delivery):
             raise ValueError(f"this cell runs to {show_duration(self.latest)} at most, and not to {until} ns")
         while (at := self._next()) <= until:
             self._advance(at)
-        self.now = max(self.now, until)
+        self.circuit.now = max(self.now, until)
 
     def step(self) -> Ns | None:
         """Let everything of the next eventful instant happen; return it, None if nothing is left to do."""
@@ -106,55 +113,35 @@ class Cell(Delivery):
         return at
 
     def _next(self) -> Ns:
-        at = min(self._deadlines)
-        if self._line_deadline < at:
-            at = self._line_deadline
+        at = self.circuit.next()
         return self._script_deadline if self._script_deadline < at else at
 
     def _advance(self, at: Ns) -> None:
         """One instant: the parts' own deadlines, then pins and power, then characters."""
-        self.now = at
-        self._advance_parts(at)
+        circuit = self.circuit
+        circuit.now = at
+        circuit.advance(at)
         if self._script_deadline <= at:
             self._act(at)
-        if self._line_deadline <= at:
-            self._hear(at)
-
-    def _advance_parts(self, at: Ns) -> None:
-        """The deadlines of the parts that are due, and what follows from them."""
-        units, contacts = self.wiring.units, False
-        for index, deadline in enumerate(self._deadlines):
-            if deadline <= at:
-                if index < units:
-                    self.parts[index].advance(at)
-                    self._touched.add(index)
-                else:
-                    contacts = True
-        self._settle()
-        if contacts:  # a pulse that was held in this instant has crossed no switch
-            for index in range(units, len(self.parts)):
-                if self._deadlines[index] <= at:
-                    self.parts[index].advance(at)
-                    self._touched.add(index)
-            self._settle()
+        circuit.hear(at)
 
     def _act(self, at: Ns) -> None:
         """Carry out the script's actions that are due; what one makes due in the parts comes before the next."""
         while self._script_deadline <= at:
             action = self._script[self._next_action]
-            if action.outside and (min(self._deadlines) <= at or self._line_deadline <= at):
+            if action.outside and self.circuit.next() <= at:
                 return  # the rest of this instant comes before it
             self._next_action += 1
             self._note_next_action()
             self._acting = True
             if _switches_on(action):
-                units = [self.unit(name) for name in self._switched_on_with(action)]
-                self.supply_all([unit for unit in units if not self.faults.switches(self.wiring.names[unit], True)])
+                names = self._switched_on_with(action)
+                self.circuit.supply_all([self.unit(name) for name in names if not self.faults.switches(name, True)])
             else:
                 self.do(action.what)
             self._acting = False
-            while min(self._deadlines) <= at:
-                self._advance_parts(at)
+            while self.circuit.parts_due <= at:
+                self.circuit.advance(at)
 
     def _switched_on_with(self, action: TimedAction) -> list[str]:
         """The units that the script switches on in one go: that of `action`, and those of the actions behind it."""
@@ -218,17 +205,7 @@ class Cell(Delivery):
             self._catch_up()
             if self.journaling:
                 self._keep(Send(line, data if isinstance(data, bytes) else tuple(data)))
-        chars = self.lines[line].immediate(data)
-        if chars:  # nothing waits on such a line: what is sent is heard
-            for unit, port in self.wiring.lines[line]:
-                if self.recording is not None:
-                    self.recording.extend(unit, [Received(self.now, port, char, self.now) for char in chars])
-                self.parts[unit].receive(port, chars, self.now)
-                self._touched.add(unit)
-            self._settle()
-        else:
-            self.lines[line].send(data, self.now)
-            self._plan_lines()
+        self.circuit.send(line, data)
         if not self._acting:
             self._catch_up()
 
@@ -237,8 +214,7 @@ class Cell(Delivery):
         if not self._acting:
             self._catch_up()
             self._keep(Discard(line))
-        self.lines[line].discard()
-        self._plan_lines()
+        self.circuit.discard(line)
 
     def type(self, unit: str, text: str) -> None:
         """The host of the unit's line sends the command line `text` to that unit, now."""
@@ -248,7 +224,7 @@ class Cell(Delivery):
             raise ValueError(f"unit {unit!r} is on no line with a host outside: a unit that is its host can send to it")
         if not self._acting:
             self._catch_up()
-        self._outside.typed(unit, text)
+        self.circuit.outside.typed(unit, text)
         self.send(line, self.serial_unit(unit).frame(text))
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:
@@ -260,9 +236,7 @@ class Cell(Delivery):
         if not self._acting:
             self._catch_up()
             self._keep(SetPin(unit, pin, level))
-        self._forced[index, pin] = level
-        if not self.faults.holds(index, pin):
-            self.give(index, pin, level)
+        self.circuit.force(index, pin, level)
 
     def release(self, unit: str, pin: str) -> None:
         """Leave an input that was driven from outside to its wire again, now; without a wire it rests.
@@ -271,14 +245,12 @@ class Cell(Delivery):
         """
         index = self.unit(unit)
         found = find_pin(self.parts[index].pins, pin)
-        if found is not None and found.kind is PinKind.STRAP and self.net_read(index, pin) is None:
+        if found is not None and found.kind is PinKind.STRAP and self.circuit.net_read(index, pin) is None:
             raise ValueError(f"{unit}.{pin} is a strap: set it to the level that it is tied to")
         if not self._acting:
             self._catch_up()
             self._keep(Release(unit, pin))
-        self._forced.pop((index, pin), None)
-        if not self.faults.holds(index, pin):
-            self.give(index, pin, self.given(index, pin))
+        self.circuit.release(index, pin)
 
     def set_switch(self, name: str, level: Level) -> None:
         """Put a switch of the cell to `level`, now."""
@@ -287,8 +259,7 @@ class Cell(Delivery):
             self._keep(SetSwitch(name, level))
         index = self.wiring.names.index(name, self.wiring.units)
         self.parts[index].set_pin("SET", level, self.now)
-        self._touched.add(index)
-        self._settle()
+        self.circuit.settle(index)
 
     def power(self, unit: str, on: bool) -> None:
         """Switch the supply of a unit, now."""
@@ -297,13 +268,12 @@ class Cell(Delivery):
             self._catch_up()
             self._keep(Power(unit, on))
         if not self.faults.switches(unit, on):
-            self.supply(index, on)
+            self.circuit.supply(index, on)
 
     def switch_on(self, part: int) -> None:
         """Let a part that is no unit (a contact) tell its level, now."""
         self.parts[part].power(True, self.now)
-        self._touched.add(part)
-        self._settle()
+        self.circuit.settle(part)
 
     def load(self, unit: str, image: bytes, base: int) -> None:
         """Put a program into the unit's memory from address `base` on, now. Raises ImageError."""
@@ -311,8 +281,7 @@ class Cell(Delivery):
             self._catch_up()
         self.controller(unit).load(image, base, self.now)
         self._keep(Load(unit, image, base))
-        self._touched.add(self.unit(unit))
-        self._settle()
+        self.circuit.settle(self.unit(unit))
 
     def place_switch(self, name: str, low: float | None, high: float | None) -> None:
         """Put a switch elsewhere on its axis, now: places as in a cell file. Raises KeyError, ValueError."""
@@ -321,8 +290,7 @@ class Cell(Delivery):
             self._catch_up()
         self.parts[index].move_contact(name, low, high, self.now)  # type: ignore[attr-defined]
         self._keep(PlaceSwitch(name, low, high))
-        self._touched.add(index)
-        self._settle()
+        self.circuit.settle(index)
 
     def start(self, unit: str) -> None:
         """Start the program in the unit's memory, now."""
@@ -333,10 +301,10 @@ class Cell(Delivery):
 
     def start_all(self, units: Iterable[str]) -> None:
         """Start the programs of several units in one instant: each finds its inputs as they were before."""
-        for unit in units:
+        started = list(units)
+        for unit in started:
             self.controller(unit).start(self.now)
-            self._touched.add(self.unit(unit))
-        self._settle()
+        self.circuit.settle(*map(self.unit, started))
 
     def halt(self, unit: str) -> None:
         """Stop all axes of a unit at once, and its program, now. Raises KeyError, TypeError."""
@@ -344,8 +312,7 @@ class Cell(Delivery):
             self._catch_up()
         self.controller(unit).halt(self.now)
         self._keep(Halt(unit))
-        self._touched.add(self.unit(unit))
-        self._settle()
+        self.circuit.settle(self.unit(unit))
         self._catch_up()
 
     def displace(self, unit: str, axis: str, by: int) -> None:
@@ -354,8 +321,7 @@ class Cell(Delivery):
             self._catch_up()
         self.controller(unit).displace(by, self.now, axis)
         self._keep(Displace(unit, axis, by))
-        self._touched.add(self.unit(unit))
-        self._settle()
+        self.circuit.settle(self.unit(unit))
         self._catch_up()
 
     def breaks(self, fault: Fault, lasting: Ns | None = None) -> int:
@@ -365,7 +331,7 @@ class Cell(Delivery):
         """
         if not self._acting:
             self._catch_up()
-        number = self.faults.begin(self, fault, lasting)
+        number = self.faults.begin(fault, lasting)
         if lasting is not None:
             self._schedule(TimedAction(self.now + lasting, Mend(number)))
         self._keep(Break(fault, lasting))
@@ -375,7 +341,7 @@ class Cell(Delivery):
         """The fault of this number is mended, now, if it is not already. Raises KeyError for a number never given."""
         if not self._acting:
             self._catch_up()
-        self.faults.mend(self, fault)
+        self.faults.mend(fault)
         self._keep(Mend(fault))
 
     def _keep(self, action: Action) -> None:
@@ -393,16 +359,47 @@ class Cell(Delivery):
     # -- looking -----------------------------------------------------------------------------------------
 
     @property
+    def now(self) -> Ns:
+        """What time it is."""
+        return self.circuit.now
+
+    @property
+    def latest(self) -> Ns:
+        """The time up to which it can run."""
+        return self.circuit.latest
+
+    @property
+    def parts(self) -> Sequence[Device]:
+        """The units, and behind them contacts and motors."""
+        return self.circuit.parts
+
+    @property
+    def lines(self) -> Sequence[Line]:
+        """The lines that join hosts and units."""
+        return self.circuit.lines
+
+    @property
+    def wiring(self) -> Wiring:
+        """How the parts are joined."""
+        return self.circuit.wiring
+
+    @property
+    def recording(self) -> Recording | None:
+        """What happened; None if it does not record. Another one may be put in its place."""
+        return self.circuit.recording
+
+    @recording.setter
+    def recording(self, recording: Recording | None) -> None:
+        self.circuit.recording = recording
+
+    @property
     def forced(self) -> Mapping[tuple[int, str], Level]:
         """The inputs that are given a level from outside, by unit and pin."""
-        return self._forced
+        return self.circuit.forced
 
     def unit(self, name: str) -> int:
         """The index of a unit. Raises KeyError."""
-        try:
-            return self.wiring.names.index(name, 0, self.wiring.units)
-        except ValueError:
-            raise KeyError(f"no unit {name!r} in this cell") from None
+        return self.wiring.unit(name)
 
     def controller(self, name: str) -> Controller:
         """The controller of that name. Raises KeyError, TypeError if the unit is none."""

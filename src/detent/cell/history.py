@@ -16,7 +16,7 @@ import numpy as np
 
 from detent.cell.actions import Action, Send, TimedAction
 from detent.cell.cell import Cell
-from detent.cell.delivery import Oscillation
+from detent.cell.circuit import Oscillation
 from detent.cell.mechanics import Mechanics
 from detent.cell.panel import Panel
 from detent.cell.recording import Batch, Entry

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from detent.cell.delivery import Store, no_store
+from detent.cell.outside import Store, no_store
 
 
 class Stored(NamedTuple):

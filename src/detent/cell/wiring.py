@@ -44,6 +44,13 @@ class Wiring(NamedTuple):
     def __deepcopy__(self, _: object) -> "Wiring":
         return self
 
+    def unit(self, name: str) -> int:
+        """The index of a unit. Raises KeyError."""
+        try:
+            return self.names.index(name, 0, self.units)
+        except ValueError:
+            raise KeyError(f"no unit {name!r} in this cell") from None
+
     def with_net(self) -> "Wiring":
         """With one more net, to which nothing is joined: the last."""
         return self._replace(reads=(*self.reads, ()))

@@ -81,8 +81,8 @@ def run(
         Print the result as one line of JSON.
     """
     from detent.cell.build import build
+    from detent.cell.circuit import Oscillation
     from detent.cell.conversation import Conversation
-    from detent.cell.delivery import Oscillation
     from detent.cell.description import Problem
     from detent.cli import FAILED, exports, outcome, sending
     from detent.cli.endings import asked_wrongly, failed

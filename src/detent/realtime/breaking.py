@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Final
 
-from detent.cell.breakage import Fault, OnLine, StuckPin, StuckSwitch, SupplyDip, WriteFailure
 from detent.cell.cell import Cell
+from detent.cell.faults import Fault, OnLine, StuckPin, StuckSwitch, SupplyDip, WriteFailure
 from detent.lines.faults import BitErrors, CableOut, Delay, LineFault, LostCharacters
 from detent.pins import Level
 from detent.realtime import verbs

@@ -182,7 +182,7 @@ class Control:
         listed: list[Json] = []
         for number, fault in cell.faults.standing.items():
             found: dict[str, Json] = {"fault": number, **breaking.told(cell, fault)}
-            tally = cell.faults.tally(cell, number)
+            tally = cell.faults.tally(number)
             if tally is not None:
                 found |= {"met": tally.met, "struck": tally.struck}
             listed.append(found)

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import TypeVar
 
-from detent.cell.breakage import StuckPin, StuckSwitch, contact
 from detent.cell.cell import Cell
+from detent.cell.faults import StuckPin, StuckSwitch
 from detent.cell.mechanics import Mechanics
 from detent.cell.switches import Switch
 from detent.controllers.device import Cautioned, Powered, Refused
@@ -62,7 +62,7 @@ def unit_state(service: Service, name: str) -> Answer:
     front = seen.front
     found: Answer = {
         "model": service.description.units[name].model,
-        "powered": cell.supplied(index),
+        "powered": cell.circuit.supplied(index),
         "pins": {pin.name: front.levels[pin.name] for pin in _pins(cell, index)},
         "received": seen.received,
         "sent": seen.sent,
@@ -86,13 +86,13 @@ def unit_state(service: Service, name: str) -> Answer:
 
 def pins_of(service: Service, name: str) -> dict[str, dict[str, Json]]:
     """The inputs, straps and outputs of a unit; the level is None where an output is let go, or nobody has asked."""
-    cell = service.cell
+    cell, circuit = service.cell, service.cell.circuit
     index, stuck = cell.unit(name), {f.pin for f in _faults(cell, StuckPin) if f.unit == name}
     return {
         pin.name: {
             "level": level_of(service, name, pin.name),
             "kind": pin.kind.value,
-            "wired": (cell.net_driven if pin.kind.drives else cell.net_read)(index, pin.name) is not None,
+            "wired": (circuit.net_driven if pin.kind.drives else circuit.net_read)(index, pin.name) is not None,
             "stuck": pin.name in stuck,
         }
         for pin in _pins(cell, index)
@@ -112,9 +112,9 @@ def switches_of(service: Service) -> dict[str, Json]:
     stuck = {fault.switch: fault.level for fault in _faults(cell, StuckSwitch)}
     found: dict[str, Json] = {}
     for name in names:
-        part, pin = contact(cell, name)
-        net = cell.net_driven(part, pin)
-        level = None if net is None else cell.nets[net].levels.get((part, pin))
+        part, pin = cell.circuit.contact(name)
+        net = cell.circuit.net_driven(part, pin)
+        level = None if net is None else cell.circuit.nets[net].levels.get((part, pin))
         found[name] = {"level": stuck.get(name, level), "stuck": name in stuck}
     return found
 
@@ -154,7 +154,7 @@ def _events(service: Service) -> list[Json]:
     """The newest, in order of time: refusals and cautions, supplies, images, characters that faults have changed."""
     cell = service.cell
     found = [(event.at, cell.wiring.names[unit], _event(event)) for unit, event in _watch(service).events]
-    for number, strike in cell.faults.strikes(cell):
+    for number, strike in cell.faults.strikes():
         told = as_json(strike) | {"event": "lost" if strike.after is None else "damaged"}
         found.append((strike.at, cell.wiring.line_names[number], told))
     found.sort(key=lambda event: event[0])

@@ -11,9 +11,10 @@ from typing import NamedTuple, TypeVar
 
 from detent.cell.build import build
 from detent.cell.cell import Cell
-from detent.cell.delivery import Oscillation, Store, no_store
+from detent.cell.circuit import Oscillation
 from detent.cell.description import Description, Problem
 from detent.cell.mechanics import Mechanics
+from detent.cell.outside import Store, no_store
 from detent.controllers import catalogue
 from detent.motors.motor import MotorError
 from detent.pins import Level

@@ -14,8 +14,8 @@ from typing import ClassVar
 from detent.cell.actions import Action, Release, SetPin
 from detent.cell.build import build
 from detent.cell.cell import Cell
-from detent.cell.delivery import no_store
 from detent.cell.history import History
+from detent.cell.outside import no_store
 from detent.cell.stores import Stores
 from detent.outputs.units import views
 from detent.realtime.boards.drive import Opened, RealPins

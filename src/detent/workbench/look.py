@@ -196,7 +196,7 @@ def switches(history: History) -> dict[str, SwitchState]:
         if isinstance(part, Mechanics):
             for contact in part.contacts:
                 driven = cell.wiring.drives[k].get(contact.name)
-                level = cell.nets[driven].levels.get((k, contact.name), 1) if driven is not None else 1
+                level = cell.circuit.nets[driven].levels.get((k, contact.name), 1) if driven is not None else 1
                 found[contact.name] = SwitchState(level, *contact.range)
         elif isinstance(part, Switch):
             low, high = part.range if isinstance(part, AxisSwitch) else (None, None)

@@ -17,7 +17,7 @@ from tests.controllers.laws.models import MODELS
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.build import build
 from detent.cell.cell import Cell
-from detent.cell.delivery import Oscillation
+from detent.cell.circuit import Oscillation
 from detent.cell.description import parse
 from detent.cell.recording import InputSet
 from detent.controllers import catalogue

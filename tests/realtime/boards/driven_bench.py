@@ -6,8 +6,8 @@ from typing import Any
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.build import build
 from detent.cell.cell import Cell
-from detent.cell.delivery import Store, no_store
 from detent.cell.description import Description, parse
+from detent.cell.outside import Store, no_store
 from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch

@@ -3,8 +3,8 @@
 import pytest
 from tests.tuner.machine.rigs import Bed, made
 
-from detent.cell.breakage import StuckSwitch
 from detent.cell.cell import Cell
+from detent.cell.faults import StuckSwitch
 from detent.moves.laws import law
 from detent.tuner.machine.bench import WitnessError, bench, knob_of
 from detent.tuner.machine.carriage import MachineError, Room

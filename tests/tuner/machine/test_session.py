@@ -5,8 +5,8 @@ import json
 import pytest
 from tests.tuner.machine.rigs import GSC200S, ROOM, TIED, Bed, gsc200s, made
 
-from detent.cell.breakage import OnLine, StuckSwitch
 from detent.cell.cell import Cell
+from detent.cell.faults import OnLine, StuckSwitch
 from detent.hosts.errors import DriverError
 from detent.lines.faults import CableOut
 from detent.motors.load import Load

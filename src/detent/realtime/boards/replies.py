@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from detent.cell.cell import Cell
-from detent.cell.delivery import Store
+from detent.cell.outside import Store
 from detent.lines.line import Heard
 from detent.ticks import NEVER, Ns
 

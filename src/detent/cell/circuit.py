@@ -1,4 +1,4 @@
-"""What reaches whom in one instant: levels over nets, characters over lines, motions to those who follow them.
+"""The parts of a cell and what joins them: what reaches whom in one instant.
 
 What the parts did is delivered in rounds: those from which wires lead in the order of their names, so that the order in
 the file changes no pulse; before them the others, in file order. Outputs are delivered in the order they were made, and
@@ -7,58 +7,37 @@ oscillation, and an error that names its pins.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import deepcopy
-from typing import NamedTuple, TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.breakage import Faults, find_pin
+from detent.cell.failing_writes import FailingWrites
+from detent.cell.outside import Outside
 from detent.cell.recording import InputSet, Received, Recording
+from detent.cell.switches import CONTACT
 from detent.cell.wiring import Wiring
 from detent.controllers.device import Device, DriveSet, EdgeSensitive, Output, Powered, StageSet, StoreImage
 from detent.lines.line import EVERYBODY, Line
-from detent.pins import HIGH, LOW, Level, Net, PinSet
+from detent.pins import HIGH, LOW, Level, Net, PinSet, find_pin
 from detent.ticks import NEVER, Ns
-from detent.uart import Format, Sent, heard_as
+from detent.uart import Chars, Format, Sent, heard_as
 
 MOST_DELIVERIES = 1_000
-
-Store: TypeAlias = Callable[[str, bytes], bool]
-"""Write the non-volatile image of a unit; say whether that succeeded."""
-
-Typed: TypeAlias = Callable[[str, str], None]
-"""A host is about to send the unit this command line, now."""
 
 
 class Oscillation(RuntimeError):
     """Outputs change each other without end in one instant."""
 
 
-class Outside(NamedTuple):
-    """What a cell reaches for outside: its copies reach for the same."""
+class Circuit:
+    """The parts of a cell, and the nets and lines that join them. `now` is set by who knows the time (`Cell`).
 
-    store: Store
-    typed: Typed
-
-    def __deepcopy__(self, _: object) -> "Outside":
-        return self
-
-
-def no_store(unit: str, image: bytes) -> bool:
-    """Images stay in the units' own memory: what a cell does that nobody gave a place for files."""
-    return True
-
-
-def nobody_asks(unit: str, text: str) -> None:
-    """Nobody wants to know what is typed."""
-
-
-class Delivery:
-    """The parts of a cell, what joins them, and what is broken of it. `now` is set by who knows the time (`Cell`)."""
+    Parts are meant by their index in `parts`, nets and lines by theirs.
+    """
 
     def __init__(
-        self, wiring: Wiring, parts: Sequence[Device], nets: Sequence[Net], lines: Sequence[Line], store: Store,
-        recording: Recording | None, typed: Typed = nobody_asks,
+        self, wiring: Wiring, parts: Sequence[Device], nets: Sequence[Net], lines: Sequence[Line],
+        outside: Outside, recording: Recording | None,
     ) -> None:  # fmt: skip
         self.wiring = wiring
         self.parts = list(parts)
@@ -67,9 +46,11 @@ class Delivery:
         self.now: Ns = 0
         self.latest: Ns = min((getattr(part, "latest", NEVER - 1) for part in parts), default=NEVER - 1)
         self.recording = recording
-        self._outside = Outside(store, typed)
-        self.faults = Faults()
-        self._forced: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
+        self.outside = outside
+        self.failing_writes = FailingWrites()
+        self.forced: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
+        self._built = wiring  # with the inputs that are stuck by now
+        self.stuck: set[tuple[int, str]] = set()  # inputs that read a level whatever they are given
         self._supplied: set[int] = set()  # units that are switched on
         self._strange: dict[int, Format] = {}  # units that speak in another format than their line
         self._driving: set[tuple[int, str]] = set()  # outputs that drive their nets: the others let them float
@@ -82,11 +63,42 @@ class Delivery:
         order = sorted(range(len(parts)), key=wired.__getitem__)
         self._turn = [order.index(part) for part in range(len(parts))]  # whose turn it is in a round
 
+    # -- time --------------------------------------------------------------------------------------------
+
+    def next(self) -> Ns:
+        """When something happens next by itself; NEVER: nothing is left to do."""
+        at = min(self._deadlines)
+        return self._line_deadline if self._line_deadline < at else at
+
+    def advance(self, at: Ns) -> None:
+        """The deadlines of the parts that are due at `at`, which is now, and what follows from them."""
+        units, contacts = self.wiring.units, False
+        for index, deadline in enumerate(self._deadlines):
+            if deadline <= at:
+                if index < units:
+                    self.parts[index].advance(at)
+                    self._touched.add(index)
+                else:
+                    contacts = True
+        self.settle()
+        if contacts:  # a pulse that was held in this instant has crossed no switch
+            for index in range(units, len(self.parts)):
+                if self._deadlines[index] <= at:
+                    self.parts[index].advance(at)
+                    self._touched.add(index)
+            self.settle()
+
+    @property
+    def parts_due(self) -> Ns:
+        """When a part is to be advanced next."""
+        return min(self._deadlines)
+
     # -- what reaches whom -------------------------------------------------------------------------------
 
-    def _settle(self) -> None:
-        """Deliver in rounds until nobody has anything more to tell."""
+    def settle(self, *parts: int) -> None:
+        """Deliver what `parts` have done, and what follows: in rounds, until nobody has anything more to tell."""
         touched = self._touched
+        touched.update(parts)
         while touched:
             if len(touched) == 1:  # nearly always
                 index = touched.pop()
@@ -138,7 +150,7 @@ class Delivery:
                     self._touched.add(follower)
             elif kind is StoreImage:
                 name = self.wiring.names[index]
-                ok = self.faults.writable(name) and self._outside.store(name, item.image)  # type: ignore[union-attr]
+                ok = self.failing_writes.succeeds(name) and self.outside.store(name, item.image)  # type: ignore[union-attr]
                 self.parts[index].stored(ok, self.now)
                 self._touched.add(index)
             elif kind is Powered:
@@ -212,8 +224,10 @@ class Delivery:
                 earliest = line.deadline
         self._line_deadline = earliest
 
-    def _hear(self, at: Ns) -> None:
+    def hear(self, at: Ns) -> None:
         """Characters whose stop bits end now reach the units of their lines."""
+        if self._line_deadline > at:
+            return
         for line, units in zip(self.lines, self.wiring.lines, strict=True):
             if line.deadline > at:
                 continue
@@ -243,9 +257,40 @@ class Delivery:
                     self.parts[unit].receive(port, chars, at)
                     self._touched.add(unit)
         self._plan_lines()
-        self._settle()
+        self.settle()
 
-    # -- what faults and hands do to it ------------------------------------------------------------------
+    # -- what the outside does to it ---------------------------------------------------------------------
+
+    def send(self, line: int, data: Chars) -> None:
+        """The host of a line sends `data`, now; characters may be damaged already."""
+        chars = self.lines[line].immediate(data)
+        if not chars:
+            self.lines[line].send(data, self.now)
+            self._plan_lines()
+            return
+        for unit, port in self.wiring.lines[line]:  # nothing waits on such a line: what is sent is heard
+            if self.recording is not None:
+                self.recording.extend(unit, [Received(self.now, port, char, self.now) for char in chars])
+            self.parts[unit].receive(port, chars, self.now)
+            self._touched.add(unit)
+        self.settle()
+
+    def discard(self, line: int) -> None:
+        """The host of a line takes back what it has not begun to send, now."""
+        self.lines[line].discard()
+        self._plan_lines()
+
+    def force(self, part: int, pin: str, level: Level) -> None:
+        """Give an input a level from outside, now, whatever its net is at."""
+        self.forced[part, pin] = level
+        if (part, pin) not in self.stuck:
+            self._give(part, pin, level)
+
+    def release(self, part: int, pin: str) -> None:
+        """Leave an input that was forced to its net again, now; without a net it rests."""
+        self.forced.pop((part, pin), None)
+        if (part, pin) not in self.stuck:
+            self._give(part, pin, self.given(part, pin))
 
     def supply(self, part: int, on: bool) -> None:
         """Switch the supply of a unit, now."""
@@ -254,8 +299,7 @@ class Delivery:
             return
         self._supplied.discard(part)
         self.parts[part].power(False, self.now)
-        self._touched.add(part)
-        self._settle()
+        self.settle(part)
 
     def supply_all(self, parts: Sequence[int]) -> None:
         """Switch on several units in one instant: each finds its inputs as all of them drive their wires at first."""
@@ -267,7 +311,7 @@ class Delivery:
             self.parts[part].power(True, self.now)
             self._touched.add(part)
             self._match_line(self.wiring.line_of[part])
-        self._settle()
+        self.settle()
 
     def _put_first_levels(self, part: int) -> None:
         """Put on its nets what a unit without supply will drive them to: a twin of it is switched on to see that."""
@@ -285,35 +329,24 @@ class Delivery:
         """Whether a unit is switched on."""
         return part in self._supplied
 
-    def give(self, part: int, pin: str, level: Level) -> None:
-        """Give an input a level, now."""
-        self._set_pin(part, pin, level)
-        self._settle()
+    # -- what breaks of it -------------------------------------------------------------------------------
 
-    def given(self, part: int, pin: str) -> Level:
-        """The level that an input is given by its wire; without a wire, by a hand; else its level at rest."""
-        net = self.net_read(part, pin)
-        if net is not None:
-            return self.nets[net].level
-        found = find_pin(self.parts[part].pins, pin)
-        return self._forced.get((part, pin), HIGH if found is None else found.rest)
+    def stick(self, part: int, pin: str, level: Level) -> None:
+        """Let an input read a level, now, whatever is wired to it or given to it."""
+        self.stuck.add((part, pin))
+        self._listen(self.net_read(part, pin))
+        self._give(part, pin, level)
+
+    def unstick(self, part: int, pin: str) -> None:
+        """Let a stuck input read its net again, now."""
+        self.stuck.discard((part, pin))
+        self._listen(self.net_read(part, pin))
+        self._give(part, pin, self.given(part, pin))
 
     def drive(self, net: int, driver: tuple[int, str], level: Level) -> None:
         """Put a level on a net, now."""
         self._drive(net, driver, level)
-        self._settle()
-
-    def net_driven(self, part: int, pin: str) -> int | None:
-        """The net that an output drives, if a wire leads from it."""
-        return self.wiring.drives[part].get(pin)
-
-    def net_read(self, part: int, pin: str) -> int | None:
-        """The net that an input is wired to, stuck or not."""
-        reader = part, pin
-        for net, readers in enumerate(self.wiring.reads):
-            if reader in readers or reader in self.faults.readers(net):
-                return net
-        return None
+        self.settle()
 
     def spare_net(self) -> int:
         """A new net, to which nothing is joined."""
@@ -325,14 +358,48 @@ class Delivery:
         """Let an output that drives a net drive another one."""
         self.wiring = self.wiring.led(part, pin, net)
 
-    def listen(self, net: int, pins: Sequence[tuple[int, str]]) -> None:
-        """Let these inputs, and no others, read a net."""
-        self.wiring = self.wiring.heard_by(net, pins)
-
     def exchange(self, line: int, other: Line) -> None:
         """Put another line in the place of a line."""
         self.lines[line] = other
         self._plan_lines()
+
+    def _listen(self, net: int | None) -> None:
+        """Let the inputs that are wired to a net read it, but for those that are stuck."""
+        if net is not None:
+            hearing = [reader for reader in self._built.reads[net] if reader not in self.stuck]
+            self.wiring = self.wiring.heard_by(net, hearing)
+
+    def _give(self, part: int, pin: str, level: Level) -> None:
+        self._set_pin(part, pin, level)
+        self.settle()
+
+    def given(self, part: int, pin: str) -> Level:
+        """The level that an input is given by its wire; without a wire, from outside; else its level at rest."""
+        net = self.net_read(part, pin)
+        if net is not None:
+            return self.nets[net].level
+        found = find_pin(self.parts[part].pins, pin)
+        return self.forced.get((part, pin), HIGH if found is None else found.rest)
+
+    # -- looking -----------------------------------------------------------------------------------------
+
+    def net_driven(self, part: int, pin: str) -> int | None:
+        """The net that an output drives, if a wire leads from it."""
+        return self.wiring.drives[part].get(pin)
+
+    def net_read(self, part: int, pin: str) -> int | None:
+        """The net that an input is wired to, stuck or not."""
+        return next((net for net, readers in enumerate(self._built.reads) if (part, pin) in readers), None)
+
+    def contact(self, switch: str) -> tuple[int, str]:
+        """The part and the pin that are the contact of a switch. Raises KeyError."""
+        names, units = self.wiring.names, self.wiring.units
+        for part in range(units, len(names)):
+            if names[part] == switch and self.net_driven(part, CONTACT) is not None:
+                return part, CONTACT
+            if names[part] != switch and self.net_driven(part, switch) is not None:
+                return part, switch  # a rotor moves it
+        raise KeyError(f"no switch {switch!r} in this cell")
 
 
 def _as_heard(sent: Sent, form: Format, read: Format) -> Sent:
