@@ -154,6 +154,13 @@ class Bench:
         self.ports[board].run_to(self.wall)
         self.machines[board].set(pin.name, bool(level) is not pin.active_low, self.ports[board].board.now)
 
+    def check_inputs(self) -> None:
+        """Behind a rest the cell has every input as it is."""
+        for name, (unit, pin) in self.plan.inputs.items():
+            board = self.boards.boards[self.plan.board_of[name]]
+            given = self.cell.forced[self.cell.unit(unit), pin]
+            assert bool(given) is board.inputs[name], f"{name} is {board.inputs[name]}, and {given} in the cell"
+
     def position(self, stepper: str) -> int:
         """Where the motor is."""
         board = self.boards.home[stepper]

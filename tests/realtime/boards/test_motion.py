@@ -252,6 +252,26 @@ def test_the_lag_is_gone_behind_a_rest() -> None:
     counts_agree(made)
 
 
+def test_a_lag_that_a_rest_has_caught_up_counts_until_its_pulses_have_left() -> None:
+    made = bench(lead=60 * MS)
+    made.move(constant_acceleration.move(1000, 1000, 1, 200).train, 1)
+    made.run(100 * MS)
+    made.turn(made.wall + 80 * MS)
+    stepper = made.boards.steppers["slide"]
+    lag = stepper.lag
+    assert lag > 20 * MS
+    made.until(lambda: not made.axes["slide"].moving)
+    made.run(lag + 25 * MS)
+    made.move(constant_acceleration.move(1000, 1000, 1, 50).train, -1)
+    made.run(3 * MS)
+    assert stepper.lag == 0
+    assert made.machine.axes["slide"].position < 200  # the last of them are still on their way
+    assert stepper.behind(made.now) == lag
+    made.rest()
+    assert stepper.behind(made.now) == 0
+    counts_agree(made)
+
+
 def test_a_small_move_queue_is_never_overrun() -> None:
     made = bench(board={"moves": 16}, error="exact")
     kept = recorded(made)

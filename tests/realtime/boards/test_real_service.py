@@ -78,7 +78,7 @@ def test_control_looks_stops_and_recovers(served: tuple[Service, Wall, list[News
     run(service, wall, 300 * MS)
     state = control.do("board", {})
     assert state["axes"]["x"]["standing"] == "driven"  # type: ignore[index]
-    assert [item.weight.value for item in news] == ["fault", "warning"]
+    assert [item.weight.value for item in news] == ["fault", "warning"], news
 
 
 @pytest.mark.parametrize(

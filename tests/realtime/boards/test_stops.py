@@ -89,6 +89,23 @@ def test_arming_late_holds_the_pulses_back() -> None:
     assert made.of(Stopped)[0].shaft == made.machine.axes["slide"].position == 0
 
 
+def test_a_stop_for_what_follows_stops_nothing_of_what_was_before_however_late_its_pulses_are() -> None:
+    """EOT is at its level when it is armed, and pulses of the motion before have yet to leave: they leave first."""
+    made = bench(MachineSwitch("slide", "gpio10", -(1 << 30), 1 << 30, inside=False))
+    made.move(constant_acceleration.move(1000, 1000, 1, None).train, 1)
+    made.run(50 * MS)
+    made.turn(made.wall + 60 * MS)
+    made.run(10 * MS)
+    assert made.boards.steppers["slide"].lag > 30 * MS
+    axis = made.axes["slide"]
+    axis.cut(made.now)
+    here = axis.shaft
+    made.boards.stops["slide"].arm({"EOT": False}, made.now)
+    made.move(constant_acceleration.move(1000, 1000, 1, None).train, -1)
+    made.until(lambda: bool(made.of(Stopped)))
+    assert made.of(Stopped)[0].shaft == here == made.machine.axes["slide"].position > 100
+
+
 def test_what_is_armed_stays_armed_while_it_is_armed_again() -> None:
     """No gap and no new trigger: the tail of a motion is guarded while the next is armed."""
     made = bench(LIMIT)

@@ -84,6 +84,7 @@ def compare(case: Case, lead: int, seed: int) -> int:
         heard = "".join(chr(h.char.value & 127) for h in wanted.lines[0].take())
         assert bench.said("x") == heard
         assert bench.driven.escaped == 0
+        bench.check_inputs()
         return bench.driven.rewinds
 
 

@@ -68,6 +68,8 @@ class Axle:
         told = self.motions.before(self.motions.count)
         place = next((n for n in range(len(told) - 1, -1, -1) if told[n].at <= at), None)
         if place is None:
+            if told and isinstance(told[0], MotionStarted):  # it had been at rest there
+                return told[0].shaft + told[0].direction * (told[0].first - 1)
             return None if told else self._shaft
         entry = told[place]
         if isinstance(entry, MotionStarted):
@@ -89,7 +91,7 @@ class Axle:
     def instant_of(self, shaft: int, near: Ns) -> Ns:
         """The instant nearest to `near` at which the cell had the shaft at `shaft`; `near` itself if there is none.
 
-        From the pulse that brought it there up to the last nanosecond before the next.
+        From the pulse that brought it there up to the last nanosecond before the next; at rest up to the next motion.
         """
         best, away = near, NEVER
         told = self.motions.before(self.motions.count)
@@ -98,14 +100,20 @@ class Axle:
                 continue
             after = told[place + 1] if place + 1 < len(told) else None
             pulse = (shaft - motion.shaft) * motion.direction
-            steps = motion.train.steps
-            if pulse < motion.first - 1 or (steps is not None and pulse > steps):
+            last = motion.train.steps
+            if after is not None:
+                last = after.first - 1 if isinstance(after, MotionStarted) else after.last
+            if pulse < motion.first - 1 or (last is not None and pulse > last):
                 continue
-            begin = motion.at if pulse < motion.first else motion.train.time_of(pulse)
-            end = NEVER if after is None else after.at
-            if pulse != steps:
-                end = min(end, motion.train.time_of(pulse + 1) - 1)
-            elif after is not None and not isinstance(after, MotionStarted):
+            if pulse >= motion.first:
+                begin = motion.train.time_of(pulse)
+            else:
+                begin = motion.at if place else min(near, motion.at)  # it had been at rest there
+            if pulse != last:
+                end = motion.train.time_of(pulse + 1) - 1
+            elif isinstance(after, MotionStarted):
+                end = after.at
+            else:
                 following = told[place + 2] if place + 2 < len(told) else None
                 end = NEVER if following is None else following.at
             if begin > end:

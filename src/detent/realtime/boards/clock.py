@@ -7,7 +7,7 @@ whole count.
 """
 
 from collections import deque
-from math import ceil
+from math import ceil, floor
 from typing import NamedTuple
 
 from detent.realtime.pace import WallNs
@@ -74,11 +74,11 @@ class Clock:
 
     def tick_at(self, wall: WallNs) -> int:
         """The tick at `wall`, as far as is known now."""
-        return self._whole + int(self._tick + self._rate * (wall - self._wall) // 1)
+        return self._whole + floor(self._tick + self._rate * (wall - self._wall))
 
     def wall_at(self, tick: int) -> WallNs:
         """The wall time of a tick."""
-        return self._wall + int(((tick - self._whole) - self._tick) / self._rate // 1)
+        return self._wall + floor((tick - self._whole - self._tick) / self._rate)
 
     def ns_at(self, wall: WallNs) -> Ns:
         """The board's own nanoseconds at `wall`: they never go back, whatever is learnt."""
@@ -88,7 +88,7 @@ class Clock:
     def wall_at_ns(self, ns: Ns) -> WallNs:
         """The first wall time at which `ns_at` is `ns` or more, as far as is known now."""
         tick = -(-ns * self.frequency // SECOND)
-        wall = self._wall + ceil(((tick - self._whole) - self._tick) / self._rate)
+        wall = self._wall + ceil((tick - self._whole - self._tick) / self._rate)
         while self.tick_at(wall) < tick:  # a float was rounded
             wall += 1
         return wall

@@ -9,12 +9,12 @@ certain.
 from collections.abc import Sequence
 
 from detent.realtime.boards.mishaps import Mishaps
-from detent.realtime.boards.several import COMMIT_EVERY
 from detent.realtime.boards.states import AxisState, BoardState, Standing
 from detent.ticks import MS, NEVER, Ns
 from detent.uart import Chars
 
 SLACK: Ns = 200 * MS  # a host that was stalled hears of a stop so late
+FORGET_EVERY: Ns = 50 * MS
 
 
 class Driven(Mishaps):
@@ -34,10 +34,11 @@ class Driven(Mishaps):
         return self.cell.next_event()
 
     def run_to(self, until: Ns) -> None:
-        """Let everything happen up to `until`, and take note of it."""
+        """Let everything happen up to `until`, and take note of it, and of what was done to the cell at its present."""
         cell = self.cell
         while (at := cell.next_event()) is not None and at <= until:
             cell.run_to(at)
+            self._instants += 1
             self._absorb()
         cell.run_to(until)
         self._absorb()
@@ -66,9 +67,10 @@ class Driven(Mishaps):
     def deadline(self) -> Ns | None:
         """When `serve` is to be called at the latest, by `clock`."""
         wall, clock = self._wall(), self.clock()
-        times = [at for at in (self.boards.deadline(), self.boards.commit_at()) if at is not None]
+        self._due = self.boards.deadline()
+        times = [at for at in (self._due, self.boards.commit_at()) if at is not None]
         if self._pending:
-            times.append(self._committed + COMMIT_EVERY)
+            times.append(self._committed + self.boards.batch)
         at = clock + min(times) - wall if times else None
         held = min((line.first for line in self.lines), default=NEVER)
         tail = min((axle.guard.next for axle in self.axles), default=NEVER)
@@ -77,7 +79,7 @@ class Driven(Mishaps):
             return at
         behind = self._behind  # what was said and stored before that is certain
         if first + behind <= self.cell.now and self._horizon() < first:
-            first = self.cell.now + COMMIT_EVERY - behind  # the boards were asked, and what they answer wakes it
+            first = self.cell.now + self.boards.batch - behind  # the boards were asked, and what they answer wakes it
         cell = min(tail, first) + behind
         if cell < NEVER:
             at = cell + self._align if at is None else min(at, cell + self._align)
@@ -86,8 +88,7 @@ class Driven(Mishaps):
     def serve(self) -> None:
         """The cell is at its present: deal with what came from the boards, and give them what is certain."""
         wall = self._wall()
-        due = self.boards.deadline()
-        if due is not None and due <= wall:
+        if self._due is not None and self._due <= wall:  # what came since may be due sooner: then it wakes the loop
             self.boards.due(wall)
         if self.abandoned:
             self.boards.events()
@@ -95,13 +96,14 @@ class Driven(Mishaps):
         events = self.boards.events()
         for event in events:
             self._happened(event)
-        self._absorb()
+        if events:
+            self._absorb()
         self._inquire()
         over = self._stores.first < NEVER and self._stores.first <= self._horizon()
-        if events or over or wall - self._looked >= COMMIT_EVERY:
+        if events or over or wall - self._looked >= self.boards.batch:
             self._looked = wall
             self._look()
-        if wall - self._committed >= COMMIT_EVERY and (
+        if wall - self._committed >= self.boards.batch and (
             self._pending or ((wanted := self.boards.commit_at()) is not None and wanted <= wall)
         ):
             self.commit()
@@ -113,8 +115,10 @@ class Driven(Mishaps):
         self._refresh()
         self._currents()
         self._prove()
-        self._stores.flush(self._horizon())
-        self._forget()
+        if self._stores.first < NEVER:
+            self._stores.flush(self._horizon())
+        if self.cell.now >= self._forgotten + FORGET_EVERY:
+            self._forget()
         moving = any(axle.motion is not None for axle in self.axles)
         if moving is not self._was_moving:
             self._was_moving = moving
@@ -130,6 +134,7 @@ class Driven(Mishaps):
                     self._place(axle, sent)
 
     def _forget(self) -> None:
+        self._forgotten = self.cell.now
         oldest = self.past.forget(self._certain() - SLACK)
         if oldest is None:
             return

@@ -30,7 +30,9 @@ from detent.ticks import MS, NEVER, Ns
 
 CERTAIN: Ns = 5 * MS  # a stop is known so long after it happened, unless the computer was late
 REPORTING: Ns = 1 * MS  # what a board takes to tell a stop, while it acknowledges something
-KEEP: Ns = 50 * MS  # between two moments to which the cell can be taken back, while a stop is armed
+KEEP: Ns = 50 * MS  # at least between two moments to which the cell can be taken back, while a stop is armed
+KEEP_QUIET: Ns = 500 * MS  # where less happens than
+BUSY = 32  # instants: what has to be lived through again from a moment on
 
 
 class Out:
@@ -86,6 +88,9 @@ class Leaving:
         self.past = Past(cell, self._counts)
         self._committed: WallNs = 0
         self._looked: WallNs = 0
+        self._due: WallNs | None = 0  # when the boards want to be looked after, as the loop was told
+        self._instants = 0  # eventful ones since the last moment was kept
+        self._forgotten: Ns = 0
         self._pending = True  # something was told that no commit has followed
         self._stages: dict[str, Stage] = {}
         self._halved: dict[str, bool] = {}  # whether a plain driver is told to give half of its current
@@ -317,11 +322,17 @@ class Leaving:
                 at = motion.at if motion is not None and not axle.guard.armed else now
                 axle.guard.want(inputs, at, now)
                 self._pending = True
-                if inputs and not kept:
-                    self.past.keep()
-                    kept = True
-        if not kept and self._guarded and (not self.past.moments or now - self.past.moments[-1].now >= KEEP):
+                kept = kept or bool(inputs)
+        if kept or (self._guarded and self._worn(now)):
             self.past.keep()
+            self._instants = 0
+
+    def _worn(self, now: Ns) -> bool:
+        """Whether the newest moment that was kept is too long ago to live on from quickly."""
+        if not self.past.moments:
+            return True
+        away = now - self.past.moments[-1].now
+        return away >= (KEEP if self._instants >= BUSY else KEEP_QUIET)
 
     def _cuts(self, axle: Axle) -> dict[str, Level]:
         """The inputs of its board that would cut what an axis does now."""

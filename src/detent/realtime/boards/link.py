@@ -14,7 +14,7 @@ from detent.realtime.boards.frames import END, ROOM, SEQUENCES, Block, Reader, b
 from detent.realtime.pace import WallNs
 from detent.ticks import MS
 
-MOST_UNDER_WAY = 12  # blocks; a board tells 16 apart
+MOST_UNDER_WAY = 7  # blocks; a board tells 16 apart, and what it said of as many before may come twice
 FIRST_PATIENCE: WallNs = 25 * MS  # without an acknowledgement, before blocks are sent again; doubles each time
 MOST_PATIENCE: WallNs = 1000 * MS
 NAK_QUIET: WallNs = 3 * MS  # requests that follow each other so closely are about the same loss

@@ -40,6 +40,7 @@ class Mishaps(TakingBack):
                 else:  # steps that had left when it failed have met a switch
                     axle.guard.fired()
                     self._place(axle, event.shaft)
+                self._heard(event.levels)
             case Slipped(_, stepper, at, by):
                 self._later(self._by_stepper[stepper], at)
                 slips = self._by_stepper[stepper].stepper.slips

@@ -83,7 +83,7 @@ class DigitalOut:
         That is the wall time up to which stops of the board have been heard of (None: there are none). What is late
         already waits for it, as one that took place meanwhile would take it back.
         """
-        if self.dead:
+        if self.dead or not (self._pending or self._back is not None or self._hungry(wall)):
             return False
         core = self._core
         soonest = core.soonest(wall)

@@ -17,6 +17,7 @@ from detent.realtime.boards.port import Port as Port
 from detent.realtime.boards.port import PortError as PortError
 from detent.realtime.boards.port import PortLost as PortLost
 from detent.realtime.boards.setup import BoardSetup
+from detent.realtime.boards.vocabulary import EVERYTHING
 from detent.realtime.pace import WallNs
 
 BAUD = 250_000  # the firmware's own default; USB boards do not care
@@ -221,7 +222,7 @@ class Look:
             return None
         words = board.core.dictionary
         return Found(self.port.address, words.version, words.mcu, words.frequency, board.left_with, words.pins,
-                     words.reserved, tuple(words.missing(board.everything)))  # fmt: skip
+                     words.reserved, tuple(words.missing(EVERYTHING)))  # fmt: skip
 
 
 def candidates() -> list[str]:

@@ -9,6 +9,9 @@ from typing import Literal, NamedTuple, Self, TypeAlias
 from detent.outputs.steps import Error
 from detent.ticks import MS, SECOND, US, Ns
 
+SHORTEST_BATCH: Ns = 1 * MS
+LONGEST_BATCH: Ns = 3 * MS
+
 
 class SetupProblem(ValueError):
     """Something on a board cannot be as it is asked: `item` (the name of a stepper, output ...), `key`, what and why.
@@ -140,6 +143,11 @@ class BoardSetup:
     outs: tuple[OutSetup, ...] = ()
     inputs: tuple[InputSetup, ...] = ()
     drivers: tuple[DriverSetup, ...] = field(default=())
+
+    @property
+    def batch(self) -> Ns:
+        """So long pulses are gathered, while there is time: longer runs, and less work; a tenth of the lead."""
+        return min(max(self.lead // 10, SHORTEST_BATCH), LONGEST_BATCH)
 
     def items(self) -> "list[Item]":
         """Everything on it that has a name and pins."""

@@ -21,7 +21,6 @@ from detent.realtime.boards.stops import Stop
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, SECOND, Ns
 
-COMMIT_EVERY: WallNs = 2 * MS  # while something moves: more often makes more commands, not better pulses
 REOPEN_EVERY: WallNs = 250 * MS
 REDRAW_EVERY: Ns = SECOND
 MEETING: Ns = 2 * SECOND
@@ -66,6 +65,8 @@ class Boards:
             self.drivers |= board.drivers
         self.master = self._pairs[0][0]
         self.lead: Ns = self.master.setup.lead
+        self.batch: WallNs = self.master.setup.batch
+        """Between two commits while something moves: more often makes more commands, not better pulses."""
         self._aligned: tuple[Ns, Ns] | None = None  # (cell time, board ns)
         self._redrawn: Ns = 0
         # a board that starts again has another clock: its time goes on where the old one stood
@@ -187,7 +188,7 @@ class Boards:
                 stop.pending for stop in board.stops.values()
             ):
                 times.append(0)
-        return max(min(times), self._committed + COMMIT_EVERY) if times else None
+        return max(min(times), self._committed + self.batch) if times else None
 
     def heard(self) -> WallNs | None:
         """Whatever stops did up to this wall time was told; None: none can do anything."""

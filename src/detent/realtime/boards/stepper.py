@@ -21,7 +21,6 @@ from detent.ticks import MS, SECOND, Ns
 LONGEST = 64  # steps of a run: looking further ahead costs more than it saves where a commit cuts runs anyway
 NOWHERE = -(1 << 62)  # before everything: the first run gets a base of its own
 SETTLED: Ns = 20 * MS  # a rest longer than the lag by this takes it back to 0
-BATCH: WallNs = 2 * MS  # pulses are sent no more often than so, while there is time
 SPARE = 4  # entries of the move queue that are left to outputs
 
 
@@ -124,6 +123,10 @@ class Stepper:
         through, lag = self._trail
         return lag if lag and tick <= self._core.scale.tick(through) + lag else self._lag
 
+    def tick(self, at: Ns) -> int:
+        """The tick at which leaves what the axis does at cell time `at`, with the lag that it has now."""
+        return self._core.scale.later(self._lag).tick(at)
+
     @property
     def shaft(self) -> int:
         """Where every pulse that was sent, and the rest of those that are certain to come, put the shaft."""
@@ -211,6 +214,13 @@ class Stepper:
 
     # -- what leaves
 
+    def settle(self, now: Ns, wall: WallNs) -> None:
+        """Let the lag grow as what `commit` is about to send needs it, so that stops can be sent for it before."""
+        due = self.next_pulse()
+        if due is not None and due <= now:
+            span = self._spans[0]
+            self._guard(span, self._runs or self._make(span), wall)
+
     def commit(self, now: Ns, wall: WallNs) -> None:
         """Send every pulse with a time up to `now`, as far as the move queue has room."""
         guarded = False
@@ -277,7 +287,7 @@ class Stepper:
         due = runs.due()
         assert due is not None
         if due - now > core.ticks(core.setup.lead) // 2 and (
-            wall - self._sent_at < BATCH or 2 * room < core.queue.size
+            wall - self._sent_at < core.setup.batch or 2 * room < core.queue.size
         ):
             return  # what waits a little makes longer runs, and there is time
         self._sent_at = wall

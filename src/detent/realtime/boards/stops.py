@@ -91,9 +91,10 @@ class Stop:
     def arm(self, inputs: Mapping[str, bool], at: Ns) -> None:
         """From cell time `at` on, `inputs` stop the stepper when they take their level; replaces what was armed.
 
-        An input that is armed at that level already stays so without a gap. No pulse leaves before the stop is in
-        force: where `at` + lead is too near, the pulses are made later. It is sent with the next commit. KeyError for
-        an input that may not stop this stepper; no inputs: disarm.
+        An input that is armed at that level already stays so without a gap. It comes into force when the pulses of
+        `at` leave, so that it stops none of what was before, and none leaves sooner: where that is too near, the
+        pulses are made later. It is sent with the next commit. KeyError for an input that may not stop this stepper;
+        no inputs: disarm.
         """
         for name in inputs:
             if name not in self._inputs:
@@ -142,13 +143,15 @@ class Stop:
         sample = core.ticks(setup.sample)
         # its verdict on the level is there before the first pulse
         verdict = sample * setup.samples
-        clock = max(core.scale.tick(at) - verdict, core.soonest(wall))
+        wanted = self._axis.tick(at) - verdict
+        clock = max(wanted, core.soonest(wall))
         core.command(
             "endstop_home", oid=watched.oid, clock=clock & MASK, sample_ticks=sample, sample_count=setup.samples,
             rest_ticks=sample, pin_value=int(level is not setup.pin.active_low), trsync_oid=self.oid,
             trigger_reason=watched.reason,
         )  # fmt: skip
-        self._axis.not_before(clock + verdict)
+        if clock > wanted:
+            self._axis.not_before(clock + verdict)
 
     def _listen_anew(self, wall: WallNs) -> None:
         """A report of the trigger before may still be on its way: behind the answer to this they are of this one."""

@@ -1,7 +1,7 @@
 """A stop in the firmware takes the cell back to where it happened, and the boards are told what is different since."""
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.actions import Action, SetPin, TimedAction
@@ -45,14 +45,14 @@ class TakingBack(Leaving):
             self._fault(axle, f"{what}: leave the input out, and wire the detector to the driver")
             self._place(axle, event.shaft)
             return
-        # what the other switches of this axis are at was so at the stop already: it stands, and reports take their time
+        # what the switches of this axis are at was so at the stop already: it stands, and reports take their time
         switches = {(unit, other) for other in self.cell.controller(unit).switches(axle.what.axis)}
         others = {
             name: int(found)
             for name, found in event.levels.items()
             if name != event.input and self.plan.inputs[name] in switches
         }
-        late = {self.plan.inputs[name] for name in others}
+        late = {self.plan.inputs[name] for name in (*others, event.input)}
         fresh = {(set_.unit, set_.pin) for when, set_, _ in self._reports if when > at}
         actions: list[Action] = []
         for name, found in others.items():
@@ -71,6 +71,13 @@ class TakingBack(Leaving):
         self._arm()
         self.commit()
         self.longest_rewind = max(self.longest_rewind, self._wall() - began)
+
+    def _heard(self, levels: Mapping[str, bool]) -> None:
+        """Inputs were asked for their levels, and no report tells them again: what the cell has not, it gets now."""
+        for name, found in levels.items():
+            self._raw[name] = int(found)
+            if self._given[name] != int(found):
+                self._give(name, int(found), self.clock())
 
     def _gates(self, axle: Axle, event: Stopped) -> bool:
         """Whether an input has stopped every single pulse of late."""
@@ -118,15 +125,17 @@ class TakingBack(Leaving):
                 place += 1
             self._stores.cut()
 
-        met: dict[str, Level] = {}
+        met: list[tuple[Ns, dict[str, Level]]] = []  # what would stop it, from when on
 
         def lived() -> None:
             self._take(self._batches(), tell=False)
-            met.update(self._cuts(stopped))
+            inputs = self._cuts(stopped)
+            if not met or inputs != met[-1][1]:
+                met.append((self.cell.now, inputs))
 
         self._stores.count = [m for m in self.past.moments if m.now <= at][-1].counts[-1]
         self.past.back(at, actions, drop, arrived, lived)
-        self._take(self._batches(), tell=False)
+        lived()
         heard: list[list[Heard]] = [self.cell.lines[number].take() for number in range(len(self.lines))]
         for line, count, new in zip(self.lines, counts[len(self.axles) :], heard, strict=True):
             for wrong, right in line.rewind(count, new):
@@ -136,10 +145,8 @@ class TakingBack(Leaving):
                 self._say(Weight.WARNING, what + instead)
         self._tell_axles(stopped, shaft, motions, counts)
         if stopped.standing is Standing.DRIVEN:  # before any pulse leaves; those that came and went meanwhile, too
-            final = self._cuts(stopped)
-            # what came and went meanwhile, but for a level that is there already: that was for later
-            watched = {n: lv for n, lv in met.items() if final.get(n) == lv or self._raw.get(n) != lv}
-            stopped.guard.want(watched, at, self.cell.now)
+            for when, inputs in met:
+                stopped.guard.want(inputs, when, when)
         self._arm()
         self.commit()
         for out in self._outs.values():

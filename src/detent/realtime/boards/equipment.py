@@ -1,0 +1,162 @@
+"""Everything on one board: its steppers, stops, inputs, outputs and drivers, each with its object in the firmware."""
+
+import json
+import zlib
+from collections.abc import Mapping
+
+from detent.realtime.boards.core import Core
+from detent.realtime.boards.dictionary import Value
+from detent.realtime.boards.drivers import Driver, Wire
+from detent.realtime.boards.inputs import Inputs
+from detent.realtime.boards.outs import DigitalOut
+from detent.realtime.boards.setup import DriverSetup, InputSetup, SetupProblem
+from detent.realtime.boards.stepper import Stepper
+from detent.realtime.boards.stops import Stop
+from detent.realtime.pace import WallNs
+from detent.ticks import Ns
+
+
+class Equipment:
+    """What `core.setup` has on the board, by name. SetupProblem for a driver that cannot be reached so."""
+
+    def __init__(self, core: Core) -> None:
+        setup = core.setup
+        self._core = core
+        self._oids = 0
+        self.steppers: dict[str, Stepper] = {}
+        self.stops: dict[str, Stop] = {}
+        stoppers: dict[str, int] = {}  # an endstop of each input that stops something
+        for stepper in setup.steppers:
+            axis = Stepper(core, stepper, [self._oid() for _ in range(1 if stepper.minus is None else 2)])
+            self.steppers[stepper.name] = axis
+            mine: dict[str, tuple[InputSetup, int]] = {}
+            for entry in setup.inputs:
+                if stepper.stops is None or entry.name in stepper.stops:
+                    mine[entry.name] = entry, self._oid()
+                    stoppers.setdefault(entry.name, mine[entry.name][1])
+            self.stops[stepper.name] = Stop(core, axis, self._oid(), mine, self._heard)
+        self.inputs = Inputs(core, setup.inputs, stoppers, self.stops, self._oid)
+        self.outs = {out.name: DigitalOut(core, out, self._oid()) for out in setup.outs}
+        self._wires: dict[tuple[str, str], Wire] = {}
+        self.drivers = {chip.name: Driver(core, chip, self._wire(chip)) for chip in setup.drivers}
+        self._triggers = {stop.oid: stop for stop in self.stops.values()}
+
+    def _oid(self) -> int:
+        self._oids += 1
+        return self._oids - 1
+
+    def _heard(self, name: str, level: bool, wall: WallNs) -> None:
+        self.inputs.heard(name, level, wall)
+
+    def _wire(self, chip: DriverSetup) -> Wire:
+        key = ("uart", chip.uart.name) if chip.uart is not None else ("spi", chip.select.name if chip.select else "")
+        if chip.uart is None and (
+            chip.select is None or (chip.bus is None and None in (chip.clock, chip.mosi, chip.miso))
+        ):
+            raise SetupProblem(chip.name, "uart", "a driver is reached by its uart pin, or by select and a bus (or "
+                               "clock, mosi and miso)")  # fmt: skip
+        if (chip.uart is None) is not (chip.kind in ("tmc2130", "tmc5160")):
+            way = "uart" if chip.kind in ("tmc2208", "tmc2209") else "select and a bus"
+            raise SetupProblem(chip.name, "kind", f"a {chip.kind} is reached by {way}")
+        if not 0 <= chip.address <= (3 if chip.kind == "tmc2209" else 0):
+            raise SetupProblem(chip.name, "address", f"a {chip.kind} has no address {chip.address}")
+        if key not in self._wires:
+            self._wires[key] = Wire(self._core, self._oid(), chip)
+        return self._wires[key]
+
+    # -- its configuration
+
+    def config(self) -> list[tuple[str, dict[str, Value | str]]]:
+        """The commands that make it all; pins by name."""
+        commands: list[tuple[str, dict[str, Value | str]]] = [("allocate_oids", {"count": self._oids})]
+        for axis in self.steppers.values():
+            commands += axis.config()
+        for stop in self.stops.values():
+            commands += stop.config()
+        commands += self.inputs.config()
+        commands += [out.config() for out in self.outs.values()]
+        for wire in self._wires.values():
+            commands += wire.config()
+        return commands
+
+    def crc(self) -> int:
+        """By which a configuration is known again, of this firmware."""
+        return zlib.crc32(json.dumps([self._core.dictionary.version, self.config()]).encode())
+
+    def configure(self) -> None:
+        """Send the configuration."""
+        for name, values in self.config():
+            self._core.command(name, **self._numbered(values))
+        self._core.command("finalize_config", crc=self.crc())
+
+    def _numbered(self, values: Mapping[str, Value | str]) -> dict[str, Value]:
+        found: dict[str, Value] = {}
+        for key, value in values.items():
+            if isinstance(value, str):
+                value = self._core.dictionary.number("spi_bus" if key == "spi_bus" else "pin", value)
+            found[key] = value
+        return found
+
+    # -- what it does
+
+    def begin(self, raw: Mapping[str, bool], wall: WallNs) -> None:
+        """The board is ready; `raw` are the levels of its input pins. Outputs are begun one by one."""
+        self.inputs.begin(raw, wall)
+        for axis in self.steppers.values():
+            axis.halt()
+        for wire in self._wires.values():
+            wire.clear()
+        for driver in self.drivers.values():
+            driver.began()
+
+    def fall(self) -> None:
+        """The board has shut down, or is gone."""
+        for axis in self.steppers.values():
+            axis.halt()
+        for stop in self.stops.values():
+            stop.clear()
+        for out in self.outs.values():
+            out.shut_down()
+        for driver in self.drivers.values():
+            driver.shut_down()
+
+    def commit(self, now: Ns, wall: WallNs) -> bool:
+        """The cell is at `now`: send what is certain. Whether an output waits until stops were heard of."""
+        for name, stop in self.stops.items():
+            if stop.pending:
+                self.steppers[name].settle(now, wall)
+                stop.commit(wall)
+        for axis in self.steppers.values():
+            axis.commit(now, wall)
+        waits, heard = False, self.heard()
+        for out in self.outs.values():
+            waits |= out.commit(wall, heard)
+        for driver in self.drivers.values():
+            driver.commit(wall)
+        return waits
+
+    def deadlines(self) -> list[WallNs | None]:
+        """When watchdogs are to be fed and counts compared."""
+        return [
+            *(out.deadline() for out in self.outs.values()),
+            *(axis.proof_due() for axis in self.steppers.values()),
+        ]
+
+    def due(self, wall: WallNs) -> None:
+        """Feed watchdogs and compare counts, where it is time."""
+        for out in self.outs.values():
+            at = out.deadline()
+            if at is not None and wall >= at:
+                out.commit(wall, self.heard())
+        for axis in self.steppers.values():
+            at = axis.proof_due()
+            if at is not None and wall >= at:
+                axis.prove(wall)
+
+    def heard(self) -> WallNs | None:
+        """Whatever its stops did up to this wall time was told; None: none of them can do anything."""
+        return min((at for stop in self.stops.values() if (at := stop.heard()) is not None), default=None)
+
+    def trigger(self, oid: int) -> Stop | None:
+        """The stop whose trigger is that object."""
+        return self._triggers.get(oid)
