@@ -5,7 +5,7 @@ What each field means is said by the motor record's reference (epics-modules/mot
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine
-from contextlib import AbstractAsyncContextManager
+from contextlib import AbstractAsyncContextManager, suppress
 from typing import Any
 
 import pytest
@@ -605,7 +605,38 @@ def test_the_largest_velocity_is_the_units_own(model: str) -> None:
         record = await bench.begin()
         assert bench["VMAX"] == bench.motor.fastest * 0.01 > 0
         await record.put("VELO", bench["VMAX"])
-        assert bench["VELO"] >= bench["VMAX"], "and it can be had, as the unit rounds it"
+        assert bench["VELO"] == pytest.approx(bench["VMAX"]), "and it can be had"
+        await record.put("VMAX", 2 * bench["VMAX"])
+        assert bench["VMAX"] == bench.motor.fastest * 0.01, "and no more"
+        await record.put("VMAX", 0)
+        assert bench["VMAX"] == bench.motor.fastest * 0.01
+
+    run(test)
+
+
+@pytest.mark.parametrize("model", ALL)
+def test_what_is_shown_never_contradicts_itself(model: str) -> None:
+    """VBAS, VELO and VMAX, whatever is put and however the unit rounds it."""
+
+    async def test() -> None:
+        bench = Bench(model)
+        record = await bench.begin()
+        top = bench.motor.fastest * 0.01
+        for part in (1.0, 0.87, 0.8, 0.5, 0.333, 0.1):
+            for field in ("VMAX", "VELO", "VBAS"):
+                await record.put("VBAS", 0.07 * top)
+                with suppress(PutFailed):
+                    await record.put(field, part * top)
+                assert bench["VBAS"] <= bench["VELO"] * (1 + 1e-9), (field, part)
+                assert bench["VELO"] <= bench["VMAX"] * (1 + 1e-9) <= top * (1 + 2e-9), (field, part)
+
+    run(test)
+
+
+def test_a_largest_velocity_beyond_the_unit_is_refused_at_the_begin() -> None:
+    async def test() -> None:
+        with pytest.raises(ValueError, match="the unit does 100 at most"):
+            await Bench("gs-c200", Settings(resolution=0.01, velocity=10, base=2, most=200)).begin()
 
     run(test)
 

@@ -28,7 +28,10 @@ from detent.bridges.epics.fields import Alarm, Settings, Value
 from detent.bridges.epics.record import Motor, MotorRecord, PutFailed
 from detent.bridges.epics.server import Context, quietly
 
-_LIMITS = {"VAL": ("LLM", "HLM"), "RBV": ("LLM", "HLM"), "DVAL": ("DLLM", "DHLM"), "DRBV": ("DLLM", "DHLM")}
+_LIMITS = {
+    "VAL": ("LLM", "HLM"), "RBV": ("LLM", "HLM"), "DVAL": ("DLLM", "DHLM"), "DRBV": ("DLLM", "DHLM"),
+    "RVAL": ("RLLM", "RHLM"), "RRBV": ("RLLM", "RHLM"), "VELO": ("VBAS", "VMAX"),
+}  # fmt: skip
 """The fields that show limits. Clients look at those of VAL before they put."""
 
 _WHOLE = {ChannelType.INT: 15, ChannelType.LONG: 31}  # bits of a whole number, without its sign

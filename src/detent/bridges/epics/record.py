@@ -37,6 +37,7 @@ from detent.hosts.exchange import AsyncPort
 
 POLL: Final = 0.02  # seconds between two looks at a motor that moves
 IDLE_POLL: Final = 1.0  # at one that stands
+TRIES: Final = 10  # to find a rate that a unit does not round up beyond the largest one
 SPEEDS: Final = ("VELO", "VBAS", "VMAX", "ACCL", "ACCS", "ACCU")
 
 
@@ -133,7 +134,9 @@ class MotorRecord:
         """
         met = None
         if not self.fields["VMAX"]:
-            self.fields["VMAX"] = self._good["VMAX"] = self._motor.fastest * abs(self._number("MRES"))
+            self.fields["VMAX"] = self._good["VMAX"] = self._most
+        if self._number("VMAX") > self._most * (1 + 1e-9):
+            raise ValueError(f"the largest velocity {self._number('VMAX'):g}: the unit does {self._most:g} at most")
         with contextlib.suppress(Busy):
             self._raw = await self._motor.position()
             met = await self._motor.limits()
@@ -540,6 +543,8 @@ class MotorRecord:
             new["ACCU"] = ACCS if field == "ACCS" else ACCL
         if (field in ("ACCS", "VMAX", "VELO", "VBAS") and not value >= 0) or (field == "ACCS" and not value):
             raise PutFailed(f"{value:g} is too little")
+        most = self._most
+        new["VMAX"] = min(new["VMAX"], most) or most  # 0: what the unit can do, as without an option
         if new["VMAX"]:
             new["VBAS"], new["VELO"] = min(new["VBAS"], new["VMAX"]), min(new["VELO"], new["VMAX"])
         new["VELO"] = max(new["VELO"], new["VBAS"])
@@ -550,6 +555,11 @@ class MotorRecord:
         new["ACCS"] = new["VELO"] / new["ACCL"] if new["ACCL"] > 0 else 0.0
         return {**new, "ACCU": int(new["ACCU"])}
 
+    @property
+    def _most(self) -> float:
+        """The largest rate of the unit in units/s."""
+        return self._motor.fastest * abs(self._number("MRES"))
+
     def _speeds(self) -> Speeds:
         step = abs(self._number("MRES"))
         return Speeds(self._number("VBAS") / step, self._number("VELO") / step, self._number("ACCL"))
@@ -557,16 +567,27 @@ class MotorRecord:
     async def _tune(self) -> None:
         """Give the motor its speeds, and show what it makes of them."""
         if not self._tuned:
+            step = abs(self._number("MRES"))
             try:
-                made = await self._motor.set_speeds(self._speeds())
+                made = await self._made(self._speeds(), self._number("VMAX") / step)
             except ValueError:
                 await self._set(**self._good)  # what it cannot do does not stay
                 raise
-            step = abs(self._number("MRES"))
             self._tuned = True
             slope = made.slew * step / made.seconds if made.seconds else 0.0
             await self._set(VBAS=made.start * step, VELO=made.slew * step, ACCL=made.seconds, ACCS=slope)
             self._good = {name: self.fields[name] for name in SPEEDS}
+
+    async def _made(self, wanted: Speeds, most: float) -> Speeds:
+        """What the motor makes of speeds: no more than the largest rate, though it may round one up."""
+        made = await self._motor.set_speeds(wanted)
+        for number in range(TRIES):
+            if not most or made.slew <= most * (1 + 1e-9):
+                break
+            slew = wanted.slew * (most / made.slew) ** (1 << number)  # a timer of few ticks has wide steps
+            wanted = wanted._replace(start=min(wanted.start, slew), slew=slew)
+            made = await self._motor.set_speeds(wanted)
+        return made
 
     async def _put_sync(self, on: float) -> None:
         """Where the motor is, is where it should be."""

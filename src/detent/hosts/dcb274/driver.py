@@ -2,7 +2,7 @@
 
 from detent.hosts.axis import Limits, Speeds
 from detent.hosts.dcb274.memory import Memory
-from detent.hosts.dcb274.ranges import FARTHEST, FASTEST, SLOWEST, ramp_seconds
+from detent.hosts.dcb274.ranges import CEILING, FARTHEST, SLOWEST, ramp_seconds, told
 from detent.hosts.dcb274.unit import REST
 from detent.hosts.errors import MotionFailed
 from detent.hosts.exchange import Asynchronous, Blocking, Steps, operation
@@ -16,7 +16,7 @@ class Dcb274(Memory):
     `home_rate` is the rate at which `home` searches: the manual's example by default (page 38).
     """
 
-    fastest = FASTEST
+    fastest = CEILING
     home_rate: float = 1000.0
 
     @operation
@@ -37,7 +37,7 @@ class Dcb274(Memory):
     def run_at(self, rate: float) -> Steps[None]:
         """Ramp to `rate` and go on (M)."""
         divide = yield from self._divisor()
-        yield from self.velocity(rate * divide)
+        yield from self.velocity(told(rate * divide))
 
     @operation
     def halt(self) -> Steps[None]:
@@ -72,7 +72,7 @@ class Dcb274(Memory):
 
     @operation
     def set_speeds(self, speeds: Speeds) -> Steps[Speeds]:
-        """I, V, K, and another D if these rates and this ramp need one. Rates are 0.16 to 36 000 steps/s.
+        """I, V, K, and another D if these rates and this ramp need one. Rates are 0.16 to 41 480 steps/s.
 
         How long a ramp takes is our reading of the unit's fixed table. Where lines have names the unit does not tell
         its speeds, and those that it was told are returned.
@@ -80,18 +80,21 @@ class Dcb274(Memory):
         start, slew, seconds = speeds
         if not 0 < start <= slew or seconds < 0:
             raise ValueError(f"start at more than 0, at no more than slew, ramp for 0 s or more; not {speeds}")
+        if start == slew:  # there is no ramp that could take its time
+            speeds = speeds._replace(seconds=0.0)
+            seconds = 0.0
         old = yield from self._divisor()
-        fit = [d for d in (old, *range(1, 256)) if start * d >= SLOWEST and slew * d <= FASTEST]
+        fit = [d for d in (old, *range(1, 256)) if start * d >= SLOWEST and slew * d <= CEILING]
         fit = [d for d in fit if _slope(speeds, d) <= 255]
         if not fit:
-            what = f"{SLOWEST} to {FASTEST} steps/s, divided by the same 1 to 255, with ramps of at most 255 steps each"
+            what = f"{SLOWEST} to {CEILING} steps/s, divided by the same 1 to 255, with ramps of at most 255 steps each"
             raise ValueError(f"no D makes {start:g} to {slew:g} steps/s in {seconds:g} s: the unit does {what}")
         divisor = fit[0]
         slope = max(_slope(speeds, divisor), 1 if seconds else 0)
         if divisor != old:
             yield from self.divide(divisor)
-        yield from self.initial_velocity(start * divisor)
-        yield from self.slew_velocity(slew * divisor)
+        yield from self.initial_velocity(told(start * divisor))
+        yield from self.slew_velocity(told(slew * divisor))
         yield from self.ramp_slope(slope, slope)
         if self.mode == "single":
             settings = yield from self.examine()

@@ -7,7 +7,8 @@ from detent.hosts.dcb274.handshake import is_name
 
 FARTHEST: Final = 8_388_607  # steps from the origin (page 47)
 MOST_STEPS: Final = 16_777_215  # of one index (page 55)
-SLOWEST, FASTEST = 40, 36_000  # steps/s (page 65)
+SLOWEST, FASTEST = 40, 36_000  # steps/s that the unit is told (page 65)
+CEILING: Final = 41_480  # steps/s that it makes of 36 000, the "42,000 SPS ceiling" in ticks of its timer (page 65)
 LARGEST_ADDRESS: Final = 2047
 TABLE_RATE: Final = 1095.4  # steps/s, times the square root of an entry's number: our reading of the fixed table
 
@@ -42,6 +43,11 @@ def speed(rate: float, *, signed: bool = False) -> int:
         either = "with a sign, or 0, " if signed else ""
         raise ValueError(f"a rate is {SLOWEST} to {FASTEST} steps/s, {either}not {rate:g}; divide() makes slower ones")
     return whole
+
+
+def told(rate: float) -> float:
+    """The rate that the unit is told so that it makes `rate`: up to its ceiling that is 36 000 steps/s at most."""
+    return max(-FASTEST, min(rate, FASTEST)) if abs(rate) <= CEILING else rate
 
 
 def sign(direction: int) -> int:
