@@ -58,7 +58,7 @@ class Breakage:
                 circuit.wiring.unit(unit)
                 if times < 0:
                     raise ValueError(f"{times} writes cannot fail; say how many do, or 0 for all")
-                circuit.failing_writes.begin(number, unit, times)
+                circuit.failing_writes[number] = unit, times or -1
             case SupplyDip(unit):
                 if lasting is None:
                     raise ValueError("a supply dip ends by itself: say how long it lasts, or switch the unit off")
@@ -92,7 +92,7 @@ class Breakage:
                 part = circuit.wiring.unit(unit)
                 circuit.unstick(part, pin)
             case WriteFailure():
-                circuit.failing_writes.end(number)
+                del circuit.failing_writes[number]
             case SupplyDip(unit):
                 if self._dips.pop(unit):
                     circuit.supply(circuit.wiring.unit(unit), True)

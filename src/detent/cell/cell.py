@@ -123,7 +123,8 @@ class Cell:
         circuit.advance(at)
         if self._script_deadline <= at:
             self._act(at)
-        circuit.hear(at)
+        if circuit.line_deadline <= at:
+            circuit.hear(at)
 
     def _act(self, at: Ns) -> None:
         """Carry out the script's actions that are due; what one makes due in the parts comes before the next."""

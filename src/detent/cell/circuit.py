@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from copy import deepcopy
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.failing_writes import FailingWrites
 from detent.cell.outside import Outside
 from detent.cell.recording import InputSet, Received, Recording
 from detent.cell.switches import CONTACT
@@ -27,6 +26,15 @@ MOST_DELIVERIES = 1_000
 
 class Oscillation(RuntimeError):
     """Outputs change each other without end in one instant."""
+
+
+class _Order(tuple[int, ...]):
+    """Never changed, and shared by copies."""
+
+    __slots__ = ()
+
+    def __deepcopy__(self, _: object) -> "_Order":
+        return self
 
 
 class Circuit:
@@ -47,28 +55,28 @@ class Circuit:
         self.latest: Ns = min((getattr(part, "latest", NEVER - 1) for part in parts), default=NEVER - 1)
         self.recording = recording
         self.outside = outside
-        self.failing_writes = FailingWrites()
         self.forced: dict[tuple[int, str], Level] = {}  # what inputs were given from outside
         self._built = wiring  # with the inputs that are stuck by now
-        self.stuck: set[tuple[int, str]] = set()  # inputs that read a level whatever they are given
+        self.stuck: list[tuple[int, str]] = []  # inputs that read a level whatever they are given
+        self.failing_writes: dict[int, tuple[str, int]] = {}  # by number: of whose memory, how many; -1: all
         self._supplied: set[int] = set()  # units that are switched on
         self._strange: dict[int, Format] = {}  # units that speak in another format than their line
         self._driving: set[tuple[int, str]] = set()  # outputs that drive their nets: the others let them float
         self._deadlines: list[Ns] = [NEVER] * len(parts)
-        self._line_deadline: Ns = NEVER  # the earliest of all lines
+        self.line_deadline: Ns = NEVER  # the earliest of all lines
         self._touched: set[int] = set()
         self._instant: Ns = -1
         self._deliveries: Counter[str] = Counter()  # of this instant, by pin
         wired = [(bool(drives), wiring.names[part] if drives else "") for part, drives in enumerate(wiring.drives)]
         order = sorted(range(len(parts)), key=wired.__getitem__)
-        self._turn = [order.index(part) for part in range(len(parts))]  # whose turn it is in a round
+        self._turn = _Order(map(order.index, range(len(parts))))  # whose turn it is in a round
 
     # -- time --------------------------------------------------------------------------------------------
 
     def next(self) -> Ns:
         """When something happens next by itself; NEVER: nothing is left to do."""
-        at = min(self._deadlines)
-        return self._line_deadline if self._line_deadline < at else at
+        at, line = min(self._deadlines), self.line_deadline
+        return line if line < at else at
 
     def advance(self, at: Ns) -> None:
         """The deadlines of the parts that are due at `at`, which is now, and what follows from them."""
@@ -80,13 +88,13 @@ class Circuit:
                     self._touched.add(index)
                 else:
                     contacts = True
-        self.settle()
+        self._settle()
         if contacts:  # a pulse that was held in this instant has crossed no switch
             for index in range(units, len(self.parts)):
                 if self._deadlines[index] <= at:
                     self.parts[index].advance(at)
                     self._touched.add(index)
-            self.settle()
+            self._settle()
 
     @property
     def parts_due(self) -> Ns:
@@ -96,9 +104,13 @@ class Circuit:
     # -- what reaches whom -------------------------------------------------------------------------------
 
     def settle(self, *parts: int) -> None:
-        """Deliver what `parts` have done, and what follows: in rounds, until nobody has anything more to tell."""
+        """Deliver what `parts` have done, and what follows."""
+        self._touched.update(parts)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Deliver in rounds, until nobody has anything more to tell."""
         touched = self._touched
-        touched.update(parts)
         while touched:
             if len(touched) == 1:  # nearly always
                 index = touched.pop()
@@ -138,8 +150,8 @@ class Circuit:
                     if index in self._strange:
                         item = _as_heard(item, self._strange[index], line.format)  # type: ignore[arg-type]
                     line.from_unit(place[1], item)  # type: ignore[arg-type]
-                    if line.deadline < self._line_deadline:
-                        self._line_deadline = line.deadline
+                    if line.deadline < self.line_deadline:
+                        self.line_deadline = line.deadline
             elif kind in _MOTION:
                 for follower in self.wiring.followers[index]:
                     self.parts[follower].follow(item)  # type: ignore[attr-defined]
@@ -150,7 +162,7 @@ class Circuit:
                     self._touched.add(follower)
             elif kind is StoreImage:
                 name = self.wiring.names[index]
-                ok = self.failing_writes.succeeds(name) and self.outside.store(name, item.image)  # type: ignore[union-attr]
+                ok = self._may_write(name) and self.outside.store(name, item.image)  # type: ignore[union-attr]
                 self.parts[index].stored(ok, self.now)
                 self._touched.add(index)
             elif kind is Powered:
@@ -161,6 +173,14 @@ class Circuit:
                     for pin, net in drives.items():
                         self._driving.discard((index, pin))
                         self._drive(net, (index, pin), HIGH, edge=False)
+
+    def _may_write(self, unit: str) -> bool:
+        """Whether a write of the unit's memory that is made now may succeed; a failure is counted."""
+        for number, (whose, left) in self.failing_writes.items():
+            if whose == unit and left:
+                self.failing_writes[number] = whose, left - 1 if left > 0 else left
+                return False
+        return True
 
     def _drive(self, net: int, driver: tuple[int, str], level: Level, *, edge: bool = True) -> None:
         """An output puts a level on its net. That it begins to drive it, or lets go, is no edge."""
@@ -222,12 +242,10 @@ class Circuit:
         for line in self.lines:
             if line.deadline < earliest:
                 earliest = line.deadline
-        self._line_deadline = earliest
+        self.line_deadline = earliest
 
     def hear(self, at: Ns) -> None:
         """Characters whose stop bits end now reach the units of their lines."""
-        if self._line_deadline > at:
-            return
         for line, units in zip(self.lines, self.wiring.lines, strict=True):
             if line.deadline > at:
                 continue
@@ -257,7 +275,7 @@ class Circuit:
                     self.parts[unit].receive(port, chars, at)
                     self._touched.add(unit)
         self._plan_lines()
-        self.settle()
+        self._settle()
 
     # -- what the outside does to it ---------------------------------------------------------------------
 
@@ -273,7 +291,7 @@ class Circuit:
                 self.recording.extend(unit, [Received(self.now, port, char, self.now) for char in chars])
             self.parts[unit].receive(port, chars, self.now)
             self._touched.add(unit)
-        self.settle()
+        self._settle()
 
     def discard(self, line: int) -> None:
         """The host of a line takes back what it has not begun to send, now."""
@@ -311,7 +329,7 @@ class Circuit:
             self.parts[part].power(True, self.now)
             self._touched.add(part)
             self._match_line(self.wiring.line_of[part])
-        self.settle()
+        self._settle()
 
     def _put_first_levels(self, part: int) -> None:
         """Put on its nets what a unit without supply will drive them to: a twin of it is switched on to see that."""
@@ -333,20 +351,20 @@ class Circuit:
 
     def stick(self, part: int, pin: str, level: Level) -> None:
         """Let an input read a level, now, whatever is wired to it or given to it."""
-        self.stuck.add((part, pin))
+        self.stuck.append((part, pin))
         self._listen(self.net_read(part, pin))
         self._give(part, pin, level)
 
     def unstick(self, part: int, pin: str) -> None:
         """Let a stuck input read its net again, now."""
-        self.stuck.discard((part, pin))
+        self.stuck.remove((part, pin))
         self._listen(self.net_read(part, pin))
         self._give(part, pin, self.given(part, pin))
 
     def drive(self, net: int, driver: tuple[int, str], level: Level) -> None:
         """Put a level on a net, now."""
         self._drive(net, driver, level)
-        self.settle()
+        self._settle()
 
     def spare_net(self) -> int:
         """A new net, to which nothing is joined."""
@@ -371,7 +389,7 @@ class Circuit:
 
     def _give(self, part: int, pin: str, level: Level) -> None:
         self._set_pin(part, pin, level)
-        self.settle()
+        self._settle()
 
     def given(self, part: int, pin: str) -> Level:
         """The level that an input is given by its wire; without a wire, from outside; else its level at rest."""
