@@ -122,6 +122,8 @@ class Breakage:
 
     def _begin_on_line(self, number: int, fault: OnLine) -> None:
         circuit = self._circuit
+        if not 0 <= fault.line < len(circuit.lines):
+            raise ValueError(f"no line {fault.line}: this cell has {len(circuit.lines)}")
         line = circuit.lines[fault.line]
         if isinstance(line, FaultyLine):
             line.begin(number, fault.fault)

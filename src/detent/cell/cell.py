@@ -201,7 +201,9 @@ class Cell:
                 self.mend(fault)
 
     def send(self, line: int, data: Chars) -> None:
-        """The host of a line sends `data`, now; characters may be damaged already."""
+        """The host of a line sends `data`, now; characters may be damaged already. Raises ValueError without a host."""
+        if self._line(line).hosted:
+            raise ValueError("the host of this line is a unit of the cell: send to that unit")
         if not self._acting:
             self._catch_up()
             if self.journaling:
@@ -212,6 +214,7 @@ class Cell:
 
     def discard(self, line: int) -> None:
         """The host of a line takes back what it has not begun to send, now; a character that has begun goes on."""
+        self._line(line)
         if not self._acting:
             self._catch_up()
             self._keep(Discard(line))
@@ -225,15 +228,16 @@ class Cell:
             raise ValueError(f"unit {unit!r} is on no line with a host outside: a unit that is its host can send to it")
         if not self._acting:
             self._catch_up()
+        data = self.serial_unit(unit).frame(text)
         self.circuit.outside.typed(unit, text)
-        self.send(line, self.serial_unit(unit).frame(text))
+        self.send(line, data)
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:
         """Drive an input pin from outside, now: a hand with a wire. Other drivers of its net are not asked.
 
-        It stays so until the wire changes, or `release`.
+        It stays so until the wire changes, or `release`. Raises KeyError, ValueError for what is no input.
         """
-        index = self.unit(unit)
+        index = self._input(unit, pin)
         if not self._acting:
             self._catch_up()
             self._keep(SetPin(unit, pin, level))
@@ -242,9 +246,9 @@ class Cell:
     def release(self, unit: str, pin: str) -> None:
         """Leave an input that was driven from outside to its wire again, now; without a wire it rests.
 
-        Raises ValueError for a strap without a wire: how it was tied is not known here.
+        Raises ValueError for a strap without a wire: how it was tied is not known here; and as `set_pin` does.
         """
-        index = self.unit(unit)
+        index = self._input(unit, pin)
         found = find_pin(self.parts[index].pins, pin)
         if found is not None and found.kind is PinKind.STRAP and self.circuit.net_read(index, pin) is None:
             raise ValueError(f"{unit}.{pin} is a strap: set it to the level that it is tied to")
@@ -254,11 +258,13 @@ class Cell:
         self.circuit.release(index, pin)
 
     def set_switch(self, name: str, level: Level) -> None:
-        """Put a switch of the cell to `level`, now."""
+        """Put a switch of the cell to `level`, now. Raises KeyError."""
+        if name not in self.wiring.names[self.wiring.units :]:
+            raise KeyError(f"no switch {name!r} in this cell")
+        index = self.wiring.names.index(name, self.wiring.units)
         if not self._acting:
             self._catch_up()
             self._keep(SetSwitch(name, level))
-        index = self.wiring.names.index(name, self.wiring.units)
         self.parts[index].set_pin("SET", level, self.now)
         self.circuit.settle(index)
 
@@ -294,11 +300,12 @@ class Cell:
         self.circuit.settle(index)
 
     def start(self, unit: str) -> None:
-        """Start the program in the unit's memory, now."""
+        """Start the program in the unit's memory, now. Raises KeyError, TypeError."""
         if not self._acting:
             self._catch_up()
-            self._keep(Start(unit))
-        self.start_all([unit])
+        self.controller(unit).start(self.now)
+        self._keep(Start(unit))
+        self.circuit.settle(self.unit(unit))
 
     def start_all(self, units: Iterable[str]) -> None:
         """Start the programs of several units in one instant: each finds its inputs as they were before."""
@@ -344,6 +351,22 @@ class Cell:
             self._catch_up()
         self.faults.mend(fault)
         self._keep(Mend(fault))
+
+    def _line(self, line: int) -> Line:
+        """The line of that number. Raises ValueError."""
+        if not 0 <= line < len(self.lines):
+            raise ValueError(f"no line {line}: this cell has {len(self.lines)}")
+        return self.lines[line]
+
+    def _input(self, unit: str, pin: str) -> int:
+        """The unit, if that is an input of it. Raises KeyError, ValueError."""
+        index = self.unit(unit)
+        found = find_pin(self.parts[index].pins, pin)
+        if found is None:
+            raise ValueError(f"{unit} has no pin {pin!r}")
+        if found.kind not in (PinKind.INPUT, PinKind.STRAP):
+            raise ValueError(f"{unit}.{pin} is no input ({found.kind.value}): only inputs are given a level")
+        return index
 
     def _keep(self, action: Action) -> None:
         """Note what is done from outside; it is done when everything else of this instant has happened."""
