@@ -3,7 +3,6 @@
 import asyncio
 import json as json_text
 import os
-import signal
 import sys
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
@@ -240,6 +239,7 @@ async def _serve(
     from detent.cli.endings import failed
     from detent.hosts.errors import DriverError
     from detent.realtime.addresses import PortError
+    from detent.realtime.system import ended_by_signals
 
     def report(text: str) -> None:
         if not quiet:
@@ -247,11 +247,10 @@ async def _serve(
 
     loop, serving = asyncio.get_running_loop(), asyncio.current_task()
     assert serving is not None
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        loop.add_signal_handler(number, serving.cancel)
     try:
-        async with _motors(prefix, axes, report) as motors:
-            await serve(motors, interfaces, ready, report)
+        with ended_by_signals(loop, serving.cancel):
+            async with _motors(prefix, axes, report) as motors:
+                await serve(motors, interfaces, ready, report)
     except (DriverError, PortError) as error:
         failed(error)
     except OSError as error:

@@ -43,7 +43,8 @@ def serve(
 ) -> None:
     """Serve a controller or a cell in real time, until Ctrl-C.
 
-    Without --pty, --tcp, --rfc2217 and --serial every line gets the endpoint of its cell file, or a pseudo-terminal.
+    Without --pty, --tcp, --rfc2217 and --serial every line gets the endpoint of its cell file, or a pseudo-terminal
+    (a free TCP port where the system has none).
     What to connect to is printed.
 
     Parameters

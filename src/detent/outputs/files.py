@@ -91,7 +91,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
     try:
         with os.fdopen(descriptor, "wb") as file:
             if mode is not None:
-                os.fchmod(descriptor, mode)
+                temporary.chmod(mode)
             yield file
             file.flush()
             os.fsync(descriptor)

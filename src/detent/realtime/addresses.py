@@ -1,7 +1,6 @@
 """What a host connects to, as people write it, and why it could not be opened, as people can mend it."""
 
 import errno
-import grp
 from pathlib import Path
 from typing import NamedTuple
 
@@ -108,7 +107,9 @@ def _network(address: Address, error: Exception, number: int | None) -> str:
 def _group(path: str) -> str:
     """The group that may open a device; dialout where it cannot be told."""
     try:
+        import grp
+
         name = grp.getgrgid(Path(path).stat().st_gid).gr_name
-    except (OSError, KeyError):
+    except (ImportError, OSError, KeyError):
         return "dialout"
     return "dialout" if name == "root" else name

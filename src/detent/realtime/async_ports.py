@@ -2,13 +2,13 @@
 
 import asyncio
 import errno
-import termios
 import time
 from contextlib import AbstractAsyncContextManager, suppress
 from typing import TYPE_CHECKING
 
 from detent.realtime.addresses import CLOSED, CONNECT_SECONDS, Address, port_error
-from detent.realtime.ports import STALLED_SECONDS, accepted, settings
+from detent.realtime.ports import STALLED_SECONDS, accepted, need_serialx, settings
+from detent.realtime.system import TerminalError
 from detent.ticks import SECOND
 from detent.uart import Format
 
@@ -145,6 +145,7 @@ class AsyncRealPort:
 
 
 async def _connect(address: Address, form: Format) -> "tuple[BaseSerialTransport, _Inbox]":
+    need_serialx(address)
     import serialx  # only here: it takes a while
 
     url = {"device": address.where, "tcp": f"socket://{address.where}"}.get(address.kind, str(address))
@@ -160,6 +161,6 @@ async def _connect(address: Address, form: Format) -> "tuple[BaseSerialTransport
             **({} if kind else {"connect_timeout": CONNECT_SECONDS}),  # type: ignore[arg-type]
             **settings(accepted(address, form)),
         )
-    except (OSError, ValueError, termios.error, serialx.SerialException) as error:
+    except (OSError, ValueError, TerminalError, serialx.SerialException) as error:
         raise port_error(address, error) from error
     return transport, inbox

@@ -5,7 +5,6 @@ The images of a cell are `NAME.UNIT.eeprom`. NAME is the stem of its file, with 
 the units with their models. People may edit it.
 """
 
-import fcntl
 import hashlib
 import json
 import os
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from detent.controllers.catalogue import MODELS
+from detent.realtime.system import NO_LINK, lock
 
 SUFFIX = ".eeprom"
 _MOST_KEY = 1 << 20  # bytes of a NAME.cell
@@ -67,10 +67,10 @@ def claim(folder: Path, target: str, models: Mapping[str, str], *, is_file: bool
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """No other process looks for a name meanwhile."""
-    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+    flags = os.O_RDWR | os.O_CREAT | NO_LINK
     descriptor = os.open(folder / "cells.lock", flags, 0o666)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        lock(descriptor, wait=True)
         yield
     finally:
         os.close(descriptor)
@@ -149,7 +149,7 @@ def _write_key(folder: Path, key: Key) -> None:
             return
     temporary = place.with_name(f"{place.name}.new")
     temporary.unlink(missing_ok=True)
-    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
+    descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | NO_LINK, 0o666)
     with os.fdopen(descriptor, "w", encoding="utf-8", errors="surrogateescape") as file:
         file.write(text)
     temporary.replace(place)

@@ -30,6 +30,7 @@ from detent.realtime import http1, openapi, verbs
 from detent.realtime.control import Ending
 from detent.realtime.endpoints.endpoint import EndpointError, descriptors_suffice
 from detent.realtime.endpoints.tcp import TcpAddress
+from detent.realtime.system import reuse_address
 from detent.realtime.verbs import Answer, AskedWrongly, Json
 
 QUIET: Final = 10.0  # seconds in which a client has to say what it wants, and to take the answer
@@ -135,7 +136,7 @@ def _listen(address: TcpAddress) -> socket.socket:
     family, kind, protocol, _, where = found[0]
     listener = socket.socket(family, kind, protocol)
     try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        reuse_address(listener)
         listener.bind(where)
         listener.listen(MOST_CLIENTS)
     except OSError:

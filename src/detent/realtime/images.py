@@ -9,7 +9,6 @@ length of the image (4), the name in UTF-8, the image, CRC-32 of everything befo
 """
 
 import contextlib
-import fcntl
 import hashlib
 import os
 import stat
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 from detent.realtime.belonging import SUFFIX, claim, safe
+from detent.realtime.system import NO_LINK, NO_WAIT, lock
 
 MOST_BYTES = 1 << 20  # of a file: the memories of the controllers have thousands
 REMEDY = "choose another place with --state DIR"
@@ -239,7 +239,7 @@ def _check_kind(path: Path) -> None:
 
 def _read(path: Path) -> bytes:
     """The content of an image's file, no link followed and nothing waited for. Raises OSError."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    descriptor = os.open(path, os.O_RDONLY | NO_LINK | NO_WAIT)
     with os.fdopen(descriptor, "rb") as file:
         return file.read(MOST_BYTES + 1)
 
@@ -248,11 +248,11 @@ def _locked(folder: Path, path: Path) -> int:
     """The descriptor of the locked file `path`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o666)
     except OSError as error:
         raise ImagesUnusable(f"EEPROM images cannot be kept in {folder}: {error.strerror}; {REMEDY}") from error
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock(descriptor)
     except BlockingIOError as error:
         os.close(descriptor)
         raise ImagesUnusable(f"{path} is locked: another process serves these units; end it, or {REMEDY}") from error
@@ -272,7 +272,7 @@ def _write_whole(path: Path, data: bytes) -> None:
     try:
         for left in (temporary, older):
             left.unlink(missing_ok=True)
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | NO_LINK, 0o666)
         with os.fdopen(descriptor, "wb") as file:
             file.write(data)
             file.flush()

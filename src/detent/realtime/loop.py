@@ -9,8 +9,8 @@ again and again.
 """
 
 import contextlib
-import os
 import signal
+import socket
 import threading
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Sequence
@@ -23,6 +23,7 @@ from detent.lines.line import Heard
 from detent.realtime import polling
 from detent.realtime.endpoints.endpoint import Endpoint, Listener
 from detent.realtime.pace import Pace, WallNs
+from detent.realtime.system import ENDING
 from detent.ticks import MS, SECOND, US, Ns
 from detent.uart import Chars
 
@@ -136,9 +137,9 @@ class Loop:
         self._stopping = False
         self._closed = False
         self._asked: deque[tuple[Callable[[], Any], Future[Any]]] = deque()  # of other threads
-        self._woken, self._waker = os.pipe()
-        os.set_blocking(self._woken, False)
-        os.set_blocking(self._waker, False)
+        self._woken, self._waker = socket.socketpair()  # and no pipe: not every system waits for pipes
+        self._woken.setblocking(False)
+        self._waker.setblocking(False)
 
     def run(self) -> None:
         """Serve until `stop`. Raises EndpointLost, and what the cell raises."""
@@ -166,11 +167,11 @@ class Loop:
     @property
     def waker(self) -> int:
         """A file descriptor that wakes it when something is written there."""
-        return self._waker
+        return self._waker.fileno()
 
     def _wake(self) -> None:
         with contextlib.suppress(BlockingIOError):  # full of earlier calls: it wakes all the same
-            os.write(self._waker, b"\0")
+            self._waker.send(b"\0")
 
     def _do_asked(self) -> None:
         for _ in range(len(self._asked)):
@@ -190,13 +191,13 @@ class Loop:
         """Let go of what the loop holds itself; the endpoints are their owner's."""
         self._closed = True
         self._cancel()
-        os.close(self._woken)
-        os.close(self._waker)
+        self._woken.close()
+        self._waker.close()
 
     def step(self) -> None:
         """Wait until there is something to do, then do it."""
         cell, clock, lines = self._cell, self._pace.clock, self._cell.lines
-        readers: dict[int, list[tuple[int, Endpoint]]] = {self._woken: []}
+        readers: dict[int, list[tuple[int, Endpoint]]] = {self._woken.fileno(): []}
         writers: dict[int, Endpoint] = {}
         for pair in self._endpoints:
             line, endpoint = pair
@@ -229,8 +230,8 @@ class Loop:
         for descriptor in readable:
             if descriptor in beside[0]:
                 continue
-            if descriptor == self._woken:
-                os.read(self._woken, 64)
+            if descriptor == self._woken.fileno():
+                self._woken.recv(64)
                 self._do_asked()
                 cell.run_to(cell.now)  # whoever stands between takes note of what was done to it
                 continue
@@ -299,11 +300,10 @@ class Loop:
 
 @contextlib.contextmanager
 def stopped_by_signals(loop: Loop) -> Iterator[None]:
-    """SIGTERM, SIGINT and SIGHUP stop `loop` while this lasts. For the main thread."""
+    """The signals that end a process stop `loop` while this lasts. For the main thread."""
     # a signal may reach another thread, and then it does not wake this one, which has to run the handlers
     descriptor = signal.set_wakeup_fd(loop.waker, warn_on_full_buffer=False)
-    signals = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-    before = {number: signal.signal(number, lambda *_: loop.stop()) for number in signals}
+    before = {number: signal.signal(number, lambda *_: loop.stop()) for number in ENDING}
     try:
         yield
     finally:

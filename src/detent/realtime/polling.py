@@ -6,7 +6,6 @@ is left, less than a millisecond, is spent looking again and again.
 """
 
 import contextlib
-import resource
 import select
 from collections.abc import Sequence
 from typing import Final
@@ -19,7 +18,7 @@ def wait(
     reading: Sequence[int], writing: Sequence[int], exceptional: Sequence[int], timeout: float | None
 ) -> tuple[list[int], list[int], list[int]]:
     """Like `select.select`, for any descriptors; it may come back up to a millisecond early. `exceptional` is empty."""
-    if max((*reading, *writing), default=0) < FEW:
+    if max((*reading, *writing), default=0) < FEW or not hasattr(select, "poll"):
         return select.select(reading, writing, exceptional, timeout)
     wanted: dict[int, int] = dict.fromkeys(reading, select.POLLIN)
     for descriptor in writing:
@@ -36,6 +35,10 @@ def wait(
 
 def allow_many() -> None:
     """Have the system give this process as many descriptors as it may have: 1 024 are the custom, for `select`."""
+    try:
+        import resource
+    except ImportError:  # a system without such a limit
+        return
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = ENOUGH if hard == resource.RLIM_INFINITY else min(hard, ENOUGH)
     if soft != resource.RLIM_INFINITY and soft < most:

@@ -9,13 +9,13 @@ import errno
 import os
 import select
 import socket
-import termios
 import threading
 import time
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Protocol, TypedDict
 
-from detent.realtime.addresses import CLOSED, CONNECT_SECONDS, Address, port_error
+from detent.realtime.addresses import CLOSED, CONNECT_SECONDS, Address, PortError, port_error
+from detent.realtime.system import TerminalError, termios
 from detent.ticks import SECOND
 from detent.uart import Format
 
@@ -152,25 +152,34 @@ def open_wire(address: Address, form: Format) -> Wire:
         raise port_error(address, error) from error
 
 
+def need_serialx(address: Address) -> None:
+    """Raise PortError where serialx, which knows serial ports and RFC 2217, cannot be loaded."""
+    try:
+        import serialx  # noqa: F401
+    except Exception as error:  # it is not for every system, and says so in many ways
+        raise PortError(f"{address}: serialx, which opens it, cannot be loaded: {error}; take HOST:PORT") from error
+
+
 def _open_serial(address: Address, form: Format) -> Wire:
+    need_serialx(address)
     import serialx  # only here: it takes a while
 
     try:
         if address.kind == "device":
             device = serialx.Serial(address.where, **settings(accepted(address, form)))  # type: ignore[abstract]  # this system's own class
             device.open()
-            return _Device(device)
+            return _Device(device) if termios is not None else _Serial(device)
         serial = serialx.serial_for_url(
             str(address), connect_timeout=CONNECT_SECONDS, write_timeout=STALLED_SECONDS, **settings(form)
         )
         serial.open()
-        return _Rfc2217(serial)
-    except (termios.error, serialx.SerialException) as error:
+        return _Serial(serial)
+    except (TerminalError, serialx.SerialException) as error:
         raise port_error(address, error) from error
 
 
-class _Descriptor:
-    """What the system reads and writes by a file descriptor that never blocks.
+class _Stream:
+    """What the system reads and writes by a descriptor that never blocks.
 
     Devices are read and written here and not through serialx, which opens and sets them up: a reply is there
     in half the time, and a device that takes nothing for a long time is an error and no endless wait.
@@ -179,17 +188,35 @@ class _Descriptor:
     kind = "device"
 
     def __init__(self, descriptor: int) -> None:
-        os.set_blocking(descriptor, False)
         self._descriptor = descriptor
-        self._readable, self._writable = select.poll(), select.poll()
-        self._readable.register(descriptor, select.POLLIN)
-        self._writable.register(descriptor, select.POLLOUT)
+        if hasattr(select, "poll"):
+            self._readable, self._writable = select.poll(), select.poll()
+            self._readable.register(descriptor, select.POLLIN)
+            self._writable.register(descriptor, select.POLLOUT)
+
+    def _take(self) -> bytes:
+        """What has come; nothing at the end. Raises BlockingIOError if there is nothing yet."""
+        return os.read(self._descriptor, MOST_READ)
+
+    def _give(self, data: bytes) -> int:
+        """Hand over what there is room for."""
+        return os.write(self._descriptor, data)
+
+    def _can_read(self, seconds: float) -> bool:
+        if hasattr(select, "poll"):
+            return bool(self._readable.poll(seconds * 1e3))
+        return bool(select.select((self._descriptor,), (), (), seconds)[0])
+
+    def _can_write(self, seconds: float) -> bool:
+        if hasattr(select, "poll"):
+            return bool(self._writable.poll(seconds * 1e3))
+        return bool(select.select((), (self._descriptor,), (), seconds)[1])
 
     def read(self, timeout: float) -> bytes:
-        if not self._readable.poll(timeout * 1e3):
+        if not self._can_read(timeout):
             return b""
         try:
-            data = os.read(self._descriptor, MOST_READ)
+            data = self._take()
         except BlockingIOError:
             return b""
         if not data:
@@ -199,21 +226,22 @@ class _Descriptor:
     def write(self, data: bytes) -> None:
         while True:
             try:
-                written = os.write(self._descriptor, data)
+                written = self._give(data)
             except BlockingIOError:
                 written = 0
             if written == len(data):
                 return
             data = data[written:]
-            if not self._writable.poll(STALLED_SECONDS * 1e3):
+            if not self._can_write(STALLED_SECONDS):
                 raise OSError(errno.EIO, f"it took nothing for {STALLED_SECONDS:g} s")
 
 
-class _Device(_Descriptor):
+class _Device(_Stream):
     """A serial device or a pseudo-terminal."""
 
     def __init__(self, serial: "BaseSerial") -> None:
         self._serial = serial
+        os.set_blocking(serial.fileno(), False)
         super().__init__(serial.fileno())
 
     def set_format(self, form: Format) -> None:
@@ -223,7 +251,7 @@ class _Device(_Descriptor):
         self._serial.close()
 
 
-class _Tcp(_Descriptor):
+class _Tcp(_Stream):
     """A TCP connection, the bytes as they are.
 
     Not through serialx, whose sockets keep Nagle's algorithm: a frame written in two parts then is answered after
@@ -237,7 +265,14 @@ class _Tcp(_Descriptor):
         self._socket = socket.create_connection((host, port), timeout=CONNECT_SECONDS)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        self._socket.setblocking(False)
         super().__init__(self._socket.fileno())
+
+    def _take(self) -> bytes:
+        return self._socket.recv(MOST_READ)
+
+    def _give(self, data: bytes) -> int:
+        return self._socket.send(data)
 
     def set_format(self, form: Format) -> None:
         raise NotImplementedError("its bytes have none")
@@ -246,8 +281,8 @@ class _Tcp(_Descriptor):
         self._socket.close()
 
 
-class _Rfc2217:
-    """A serial port of another computer, which is told the format."""
+class _Serial:
+    """Through serialx: a serial port of another computer, or a device of a system that has its own ways with them."""
 
     def __init__(self, serial: "BaseSerial") -> None:
         self._serial = serial

@@ -61,7 +61,7 @@ class Service:
         real: RealPins | None = None,
         timers: Sequence[Timer] = (),
     ) -> None:
-        """Build the cell and open `endpoints` for every line; nothing: what the cell file says, or a pty.
+        """Build the cell and open `endpoints` for every line; nothing: what the cell file says, or the usual one.
 
         `images` stay their owner's. One that is `observed` can be looked at and meddled with (`realtime.control`).
         `on_stop` is told when the cell cannot go on; it is served all the same. With `real` it drives the boards of its
@@ -225,7 +225,7 @@ def open_endpoints(
     placed: Mapping[str, Sequence[EndpointSpec]] | None = None,
     link: Callable[[str], Path] | None = None,
 ) -> list[tuple[int, Endpoint]]:
-    """Open `endpoints` for every line, with the line's number; nothing: what the cell file says, or a pty.
+    """Open `endpoints` for every line, with the line's number; nothing: what the cell file says, or the usual one.
 
     `placed` says it for lines by name instead: those of a service before this one. A pty that nobody has given a place
     gets the `link` for its line, if that can be had. `opening` closes them. Raises Problem, EndpointError, ValueError.
@@ -266,7 +266,7 @@ def _for_line(
         return endpoints if lines == 1 else [one.of_several(number, name) for one in endpoints]
     described = description.lines.get(name)
     if described is None or described.endpoint is None:
-        return (EndpointSpec("pty"),)
+        return (EndpointSpec.usual(),)
     try:
         return (EndpointSpec.parse(described.endpoint),)
     except ValueError as error:

@@ -1,13 +1,14 @@
 """The log of a tuning run on a machine: a line of JSON for everything that happened, on disk before the next begins."""
 
 import contextlib
-import fcntl
 import json
 import os
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
+
+from detent.realtime.system import lock
 
 
 class LogUnusable(OSError):
@@ -35,7 +36,7 @@ class TrialLog:
 
     def _read(self) -> list[Mapping[str, Any]]:
         try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(self._file.fileno())
         except BlockingIOError:
             raise LogUnusable(f"{self.path}: another run writes it: wait for its end, or give another --log") from None
         except OSError:

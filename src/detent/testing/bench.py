@@ -228,7 +228,7 @@ class Bench:
         folder = self.folder / (f"eeprom-{same + 1}" if same else "eeprom")  # two at once have their own
         images = Images.of(folder, str(target), models(description), is_file=bool(description.file))
         endpoints = [
-            EndpointSpec("pty"),
+            EndpointSpec.usual(),
             *([EndpointSpec("tcp", "127.0.0.1:0")] if tcp else []),
         ]
         beside = Path(description.file).parent if description.file else Path()

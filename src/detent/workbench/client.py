@@ -7,9 +7,8 @@ drawing, and drawing never delays the cell: what happened is streamed here, and 
 import asyncio
 import contextlib
 import pickle
-import socket
 import sys
-from asyncio.subprocess import DEVNULL, Process
+from asyncio.subprocess import Process
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from detent.pins import Level
 from detent.realtime.cell_source import find_cell
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.ticks import SECOND, Ns
-from detent.workbench import exports
+from detent.workbench import exports, joining
 from detent.workbench.messages import (
     Answer,
     Ask,
@@ -123,14 +122,7 @@ class Bench:
 
     async def _start(self, order: Order) -> None:
         """Start an engine and wait until it serves."""
-        ours, theirs = socket.socketpair()
-        with theirs:
-            # a session of its own: Ctrl-C at the terminal is for the workbench, which then ends it
-            self._process = await asyncio.create_subprocess_exec(
-                sys.executable, "-P", "-m", "detent.workbench.process", str(theirs.fileno()),
-                pass_fds=(theirs.fileno(),), stdin=DEVNULL, stdout=DEVNULL, start_new_session=True,
-            )  # fmt: skip
-        ours.setblocking(False)
+        self._process, ours = await joining.started()
         reader, self._writer = await asyncio.open_connection(sock=ours)
         self._ready = asyncio.get_running_loop().create_future()
         self._writer.write(packed(order))

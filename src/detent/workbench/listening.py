@@ -6,6 +6,8 @@ import ipaddress
 import socket
 from typing import NamedTuple
 
+from detent.realtime.system import reuse_address
+
 USUAL = 8274  # the port without a word: a browser keeps what it remembers by address and port
 TRIED = 10  # ports from there on, before any that is free
 
@@ -50,7 +52,7 @@ def listen(place: Place) -> Listening:
     family = socket.AF_INET6 if ":" in place.host else socket.AF_INET
     bound = socket.socket(family, socket.SOCK_STREAM)
     try:
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        reuse_address(bound)
         bound.bind((place.host, place.port))
         bound.listen(128)  # now, so that whoever is told the address may connect at once
     except OSError:

@@ -1,6 +1,6 @@
 """What the process of the engine runs: it reads what is ordered of its pipe, and serves until that ends.
 
-`Bench.open` starts it with the file descriptor of its end of the pipe.
+`Bench.open` starts it (`joining`).
 """
 
 import pickle
@@ -11,6 +11,7 @@ from detent.cell.description import Problem
 from detent.realtime.endpoints.endpoint import EndpointError
 from detent.realtime.images import ImagesUnusable
 from detent.workbench.engine import Engine
+from detent.workbench.joining import joined
 from detent.workbench.messages import Failed, Order
 from detent.workbench.pipe import HEAD, packed
 
@@ -33,9 +34,9 @@ def _read_order(end: socket.socket) -> Order | None:
     return order if isinstance(order, Order) else None
 
 
-def main(descriptor: int) -> int:
+def main(words: list[str]) -> int:
     """Open what the first message on the pipe orders, and serve it until the pipe ends."""
-    end = socket.socket(fileno=descriptor)
+    end = joined(words)
     order = _read_order(end)
     if order is None:
         return 0
@@ -54,4 +55,4 @@ def main(descriptor: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1])))
+    sys.exit(main(sys.argv[1:]))

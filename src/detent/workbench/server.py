@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import hashlib
-import signal
 import socket
 from collections.abc import Callable, Iterator, Mapping
 from importlib.resources import as_file, files
@@ -17,6 +16,7 @@ from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 import detent
+from detent.realtime.system import ended_by_signals
 from detent.workbench import filing, shell
 from detent.workbench.beginning import Beginning
 from detent.workbench.board import Board
@@ -93,16 +93,13 @@ async def serve(application: Guard, listening: Listening, ready: Callable[[], No
     )  # fmt: skip
     server = _Server(config)
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        loop.add_signal_handler(number, server.end)
-    serving = asyncio.create_task(server.serve(sockets=[listening.socket]))
-    telling = asyncio.create_task(server.told_started(ready))
-    try:
-        await serving
-    finally:
-        telling.cancel()
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            loop.remove_signal_handler(number)
+    with ended_by_signals(loop, server.end):
+        serving = asyncio.create_task(server.serve(sockets=[listening.socket]))
+        telling = asyncio.create_task(server.told_started(ready))
+        try:
+            await serving
+        finally:
+            telling.cancel()
 
 
 class _Server(uvicorn.Server):

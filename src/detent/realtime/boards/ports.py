@@ -1,10 +1,7 @@
 """Where bytes of a board come from: a serial device, or a fake board in this process."""
 
-import fcntl
 import os
 import select
-import termios
-import tty
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +16,7 @@ from detent.realtime.boards.port import PortLost as PortLost
 from detent.realtime.boards.setup import BoardSetup
 from detent.realtime.boards.vocabulary import EVERYTHING
 from detent.realtime.pace import WallNs
+from detent.realtime.system import TerminalError, lock, termios
 
 BAUD = 250_000  # the firmware's own default; USB boards do not care
 MOST_READ = 4096
@@ -52,6 +50,10 @@ class SerialPort:
         self._open()
 
     def _open(self) -> None:
+        if termios is None:
+            raise PortError(f"{self._device}: real boards need Linux or macOS; fake: is a board without one")
+        import tty
+
         device = self._device
         try:
             self._descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -63,11 +65,11 @@ class SerialPort:
             tty.setraw(self._descriptor)
             if not os.path.realpath(device).startswith("/dev/pts/"):
                 self._set_baud()
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(self._descriptor)
         except BlockingIOError as error:
             self.close()
             raise PortError(f"{device} is in use by another program; end that first") from error
-        except (OSError, termios.error, ValueError) as error:
+        except (OSError, TerminalError, ValueError) as error:
             self.close()
             raise PortError(f"{device} is no serial device: {error}; name the board's own, as in {BY_ID}") from error
 

@@ -3,12 +3,12 @@
 import os
 import select
 import stat
-import termios
 from collections.abc import Sequence
 
 from detent.extras import how_to_install
 from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost, Outgoing, read_ready
 from detent.realtime.pace import WallNs
+from detent.realtime.system import TerminalError, termios
 from detent.uart import Format
 
 
@@ -19,6 +19,8 @@ class SerialPort:
 
     def __init__(self, address: str, form: Format) -> None:
         """Raises EndpointError if the device cannot be opened so."""
+        if termios is None:
+            raise EndpointError("serial ports are served on Linux and macOS; here take --tcp or --rfc2217 HOST:PORT")
         try:
             import serialx
         except ImportError as error:
@@ -31,7 +33,7 @@ class SerialPort:
                 address, form.baud, byte_size=form.data_bits, parity=form.parity[0].upper(), stopbits=form.stop_bits
             )
             self._port.open()
-        except (OSError, ValueError, termios.error, serialx.SerialException) as error:
+        except (OSError, ValueError, TerminalError, serialx.SerialException) as error:
             reason = getattr(error, "strerror", None) or error.args[-1]
             raise EndpointError(
                 f"{address} cannot be opened at {form}: {reason}; name a serial device that is there and free"

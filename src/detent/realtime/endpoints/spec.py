@@ -3,12 +3,12 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from detent.realtime.endpoints.endpoint import Endpoint
+from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
 from detent.realtime.endpoints.opened import Openings
-from detent.realtime.endpoints.pty import PseudoTerminal
 from detent.realtime.endpoints.rfc2217 import Rfc2217Port
 from detent.realtime.endpoints.serialport import SerialPort
 from detent.realtime.endpoints.tcp import TcpAddress, TcpPort
+from detent.realtime.system import termios
 from detent.uart import Chars, Format
 
 _LISTENING = ("tcp", "rfc2217")  # those that are a HOST:PORT
@@ -19,6 +19,11 @@ class EndpointSpec(NamedTuple):
 
     kind: str
     where: str = ""
+
+    @classmethod
+    def usual(cls) -> "EndpointSpec":
+        """Where nothing is asked for: a pseudo-terminal, or a free TCP port where the system has none."""
+        return cls("pty") if termios is not None else cls("tcp", "127.0.0.1:0")
 
     @classmethod
     def parse(cls, text: str) -> "EndpointSpec":
@@ -66,6 +71,10 @@ class EndpointSpec(NamedTuple):
         """
         match self.kind:
             case "pty":
+                if termios is None:
+                    raise EndpointError("this system has no pseudo-terminals; take --tcp or --rfc2217 HOST:PORT")
+                from detent.realtime.endpoints.pty import PseudoTerminal
+
                 return PseudoTerminal(Path(self.where) if self.where else None, parting, openings)
             case "tcp":
                 return TcpPort(TcpAddress.parse(self.where), name, parting)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from detent.realtime.endpoints.endpoint import MOST_READ, OUT_OF_DESCRIPTORS, EndpointError, Outgoing
 from detent.realtime.pace import WallNs
+from detent.realtime.system import reuse_address
 from detent.ticks import SECOND
 from detent.uart import Chars
 
@@ -201,7 +202,7 @@ def _listen(address: TcpAddress) -> socket.socket:
     family, kind, protocol, _, where = found[0]
     listener = socket.socket(family, kind, protocol)
     try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        reuse_address(listener)
         listener.setblocking(False)
         listener.bind(where)
         listener.listen(_BACKLOG)
