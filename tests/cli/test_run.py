@@ -260,6 +260,18 @@ def test_a_refused_line_that_was_sent_ends_with_status_1(capsys: pytest.CaptureF
     assert "gs-c200 refused 'A9'" in capsys.readouterr().err
 
 
+def test_a_line_that_a_busy_module_turns_down_is_told_and_one_that_waits_for_idle_is_not(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    lines = ["--send", "S20", "--send", "T50", "--send", "+100"]
+    assert detent("run", "gs-c200", "--no-line-timing", *lines) == 1
+    assert "gs-c200 refused '+100' at 0 ns: busy: nothing is done" in capsys.readouterr().err
+    waiting = [part for line in lines[1::2] for part in ("--send", line, "--send", "@ idle")]
+    assert detent("run", "gs-c200", "--no-line-timing", *waiting, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["units"]["gs-c200"]["position"] == 100
+
+
+
 @pytest.mark.parametrize(
     ("tokens", "message"),
     [

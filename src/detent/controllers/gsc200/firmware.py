@@ -284,6 +284,8 @@ class GsC200:
             return
         row = commands.row(self.model, instruction.op)
         if self._running.busy and not row.running:
+            reason = "busy: nothing is done; wait until F answers R, and send it again"
+            self._out.append(Refused(now, frame.text, reason))
             self._answer("B", now)
         elif self._programming and row.stored:
             try:
