@@ -279,7 +279,9 @@ async def _motors(
             try:
                 await motor.begin()
             except ValueError as error:
-                raise Problem("", axis.record, f"{error}; see --velocity, --base, --acceleration and --max-velocity") from None
+                raise Problem(
+                    "", axis.record, f"{error}; see --velocity, --base, --acceleration and --max-velocity"
+                ) from None
             motors.append(motor)
         yield motors
     finally:

@@ -176,6 +176,23 @@ def test_any_format_can_be_asked_for_again_and_again(settings: dict[str, Any]) -
             settle(loop)
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux refuses formats on a pseudo-terminal")
+def test_what_was_changed_in_between_is_seen_even_within_one_setting() -> None:
+    """The C library looks before and after; a loop that is quick changes something between the two."""
+    terminal = PseudoTerminal()
+    with (
+        served(terminal, TickingCell(None)) as loop,
+        serial.Serial(terminal.address, timeout=0, **SETTINGS[0]) as client,
+    ):
+        settle(loop)
+        before = termios.tcgetattr(client.fileno())[5]
+        for number in range(5):
+            client.timeout = number
+            settle(loop)
+            before, after = termios.tcgetattr(client.fileno())[5], before
+            assert before != after
+
+
 def settle(loop: Loop) -> None:
     """Have the loop see what the kernel has to tell."""
     for _ in range(3):

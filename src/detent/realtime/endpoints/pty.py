@@ -22,7 +22,7 @@ from detent.realtime.endpoints.opened import Opened, Openings
 from detent.realtime.pace import WallNs
 from detent.uart import Chars
 
-UNUSUAL = termios.B134
+UNUSUAL = (termios.B134, termios.B150)  # two, for a client that looks before and after it has set something
 _EXTPROC = 0o200000  # of the local flags, on Linux
 _TELLS = sys.platform.startswith("linux")
 _LFLAG, _ISPEED, _OSPEED = 3, 4, 5  # in what `tcgetattr` gives
@@ -53,6 +53,7 @@ class PseudoTerminal:
         self._owed: Chars = b""  # to the line: it has not heard yet that they left
         self._link: Path | None = None
         self._clients: Opened | None = None
+        self._unusual = UNUSUAL[-1]
         try:
             tty.setraw(self._theirs)
             os.set_blocking(self._ours, False)
@@ -60,7 +61,7 @@ class PseudoTerminal:
             _lock(self._theirs)
             if _TELLS:
                 fcntl.ioctl(self._ours, termios.TIOCPKT, struct.pack("i", 1))
-                _unsettle(self._theirs)
+                self._unsettle()
             self._clients = Opened(self._device, openings)
             if link is not None:
                 _point(link, self._device)
@@ -106,9 +107,12 @@ class PseudoTerminal:
             return read
         self._said |= len(read) > 1
         if read[:1] != b"\0":  # not data
-            _unsettle(self._theirs)
+            self._unsettle()
             return b""
         return read[1:]
+
+    def _unsettle(self) -> None:
+        self._unusual = _unsettle(self._theirs, self._unusual)
 
     def send(self, data: bytes, wall: WallNs) -> None:
         """Give `data` to the client, now or when it reads."""
@@ -151,13 +155,15 @@ class PseudoTerminal:
         self._ours = self._theirs = -1
 
 
-def _unsettle(descriptor: int) -> None:
-    """Whatever a client sets next makes a difference, and is told."""
+def _unsettle(descriptor: int, last: int) -> int:
+    """Whatever a client sets next makes a difference, and is told. The speed for that: another than the `last` one."""
     settings = termios.tcgetattr(descriptor)
-    if settings[_OSPEED] != UNUSUAL or not settings[_LFLAG] & _EXTPROC:
-        settings[_ISPEED] = settings[_OSPEED] = UNUSUAL
+    if settings[_OSPEED] not in UNUSUAL or not settings[_LFLAG] & _EXTPROC:
+        last = next(speed for speed in UNUSUAL if speed != last)
+        settings[_ISPEED] = settings[_OSPEED] = last
         settings[_LFLAG] |= _EXTPROC
         termios.tcsetattr(descriptor, termios.TCSANOW, settings)
+    return last
 
 
 _SET_LOCK = getattr(fcntl, "F_OFD_SETLK", None)  # of an open file, so that no other opening or closing releases it
