@@ -8,6 +8,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Final
@@ -35,6 +36,10 @@ from detent.ramps.short_movements import choose, movement
 from detent.ramps.ways import Way
 from detent.realtime import openapi, verbs
 from detent.ticks import show_duration
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import cell_keys
 
 DOCS: Final = Path(__file__).parent
 MARKED: Final = re.compile(r"(<!-- generated: (.+?) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -274,6 +279,11 @@ def _only(name: str, models: Sequence[str]) -> str:
 # -- from the parts of a cell ------------------------------------------------------------------------------
 
 
+def cell_keys_of(kind: type[object]) -> str:
+    """Every key of a table of a cell file."""
+    return table(("key", "takes", "default", "what"), cell_keys.rows(kind))
+
+
 def cell_parts() -> str:
     """Units that are no controllers."""
     text = []
@@ -400,6 +410,7 @@ PARTS: Final[dict[str, Callable[[], str]]] = {
     "commands of the GS-C200S": lambda: section(GS_C200S, "Commands"),
     "image bytes": image_bytes,
     "parts of a cell": cell_parts,
+    **{f"keys of {name}": partial(cell_keys_of, kind) for name, kind in cell_keys.TABLES.items()},
     "pins of the DCB-274": lambda: section("dcb-274", "Pins").partition("\n")[2],
     "options of the DCB-274": lambda: section("dcb-274", "Options").partition("\n")[2],
     "commands of the DCB-274": lambda: section("dcb-274", "Commands").partition("\n")[2],

@@ -2,14 +2,15 @@
 
 import importlib.util
 import re
+from dataclasses import is_dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import get_args
 
 import pytest
+from pydantic import BaseModel
 
-from detent.cell import description, form, tables
-from detent.cell.build import build
-from detent.cell.description import Problem, parse
+from detent.cell import description, form
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -101,36 +102,31 @@ def test_every_ruling_has_a_proof_that_exists() -> None:
     assert not missing
 
 
-TABLES = {
-    "The file": description.Description,
-    "Units": description.Unit,
-    "Wires": tables.Wire,
-    "Switches": tables.Switch,
-    "Motors": tables.Motor,
-    "Lines": tables.Line,
-    "Script": tables.ScriptEntry,
-}
-
-
-def written(table: type[object]) -> dict[str, str]:
-    """The keys of a table with their defaults, as the page writes them."""
-    schema = form.adapter(table).json_schema(mode="validation")
-    found = {}
-    for key in form.keys(table):
-        default = schema["properties"][key].get("default")
-        if key in schema.get("required", ()):
-            found[key] = "required"
-        else:
-            found[key] = "" if default in (None, {}, [], "") else str(default).lower()
+def reached(table: type[object], found: list[type[object]]) -> list[type[object]]:
+    """A table of a cell file, and every table that one of its keys takes."""
+    if table not in found:
+        found.append(table)
+        for hint in form.hints(table).values():
+            for part in parts_of(hint):
+                reached(part, found)
     return found
 
 
-@pytest.mark.parametrize("title", TABLES)
-def test_the_reference_of_cell_files_has_every_key_with_its_default(title: str) -> None:
-    text = (DOCS / "how-to" / "cells.md").read_text()
-    section = text.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
-    rows = re.findall(r"^\| `(\w+)` \| [^|]+ \|([^|]*)\|", section, re.MULTILINE)
-    assert {key: default.strip() for key, default in rows} == written(TABLES[title])
+def parts_of(hint: object) -> list[type[object]]:
+    if isinstance(hint, type) and (is_dataclass(hint) or issubclass(hint, BaseModel)):
+        return [hint]
+    return [part for inner in get_args(hint) for part in parts_of(inner)]
+
+
+def test_the_reference_of_cell_files_has_every_table() -> None:
+    assert set(generator().cell_keys.TABLES.values()) == set(reached(description.Description, []))
+
+
+@pytest.mark.parametrize("name", generator().cell_keys.TABLES)
+def test_every_key_of_a_cell_file_has_a_meaning(name: str) -> None:
+    keys = generator().cell_keys
+    for key, _, _, meaning in keys.rows(keys.TABLES[name]):
+        assert len(meaning) > len(key), key
 
 
 def refusal(text: str) -> str:

@@ -39,14 +39,24 @@ class Unit:
     __pydantic_config__: ClassVar[Mapping[str, object]] = {"extra": "forbid", "allow_inf_nan": False}
 
     model: str
-    program: str | None = None  # file, loaded into program memory and started when the cell starts
-    eeprom: str | None = None  # file, in non-volatile memory unless an image is kept for the unit
+    """A controller (`detent models`), or a [part](#parts) that is none."""
+    program: str | None = None
+    """A file, put into program memory and started when the cell starts, as a host would."""
+    eeprom: str | None = None
+    """A file with what the EEPROM holds when the cell starts; with `serve`, an image that was kept goes before it."""
     straps: "dict[str, Steps | str]" = field(default_factory=dict)
+    """Levels of strap pins; `open` too. Those that are not named are as the manual has them."""
     options: "dict[str, Steps | Number | str]" = field(default_factory=dict)
-    powered: bool = True  # when the cell starts
-    shaft: "Steps" = 0  # where the axis stands when the cell starts, in steps
-    supply: "Number | None" = None  # V, checked against the model's limits
-    loads: "dict[str, Number]" = field(default_factory=dict)  # A drawn from supply outputs by pin, checked likewise
+    """What no pin decides, by name."""
+    powered: bool = True
+    """Whether the supply is on when the cell starts."""
+    shaft: "Steps" = 0
+    """Steps: where the axis stands when the cell starts, for switches on it; the counter of the controller begins at
+    0 all the same."""
+    supply: "Number | None" = None
+    """V: refused if the model's manual does not allow it."""
+    loads: "dict[str, Number]" = field(default_factory=dict)
+    """A by pin: currents drawn from the supply outputs, refused if they are more than the manual allows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,15 +66,25 @@ class Description:
     __pydantic_config__: ClassVar[Mapping[str, object]] = {"extra": "forbid", "allow_inf_nan": False}
 
     title: str = ""
+    """Heads figures and stories."""
     units: "dict[Name, Unit]"
+    """What stands in the cell: `[units.NAME]`."""
     wires: "list[Wire]" = field(default_factory=list)
+    """Which output leads to which input: `[[wires]]`."""
     switches: "dict[Name, Switch]" = field(default_factory=dict)
+    """Contacts, set by the script or moved by an axis: `[switches.NAME]`."""
     motors: "dict[Name, Motor]" = field(default_factory=dict)
+    """Motors with drive and load on the axes: `[motors.NAME]`."""
     lines: "dict[Name, Line]" = field(default_factory=dict)
+    """Who shares a serial line: `[lines.NAME]`."""
     script: "list[ScriptEntry]" = field(default_factory=list)
+    """What is done to the cell, and when: `[[script]]`."""
     boards: "dict[Name, Board]" = field(default_factory=dict)
+    """Boards with real pins, which `serve --real` drives: `[boards.NAME]`."""
     hardware: "Annotated[dict[str, Hardware], BeforeValidator(by_axis)]" = field(default_factory=dict)
+    """Which pins of a board are behind a unit: `[hardware.UNIT]`, or `[hardware.UNIT.AXIS]`."""
     file: str = ""
+    """The name of the file in error messages; no key of a file."""
 
     def __post_init__(self) -> None:
         if not self.units:

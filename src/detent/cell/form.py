@@ -4,9 +4,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from reprlib import Repr
-from typing import Annotated, Any, TypeVar, cast, get_args, get_type_hints
+from typing import Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
-from pydantic import AliasChoices, BaseModel, BeforeValidator, TypeAdapter, ValidationError
+from pydantic import AliasChoices, BaseModel, BeforeValidator, Field, TypeAdapter, ValidationError
 
 from detent.cell import fields as kinds
 from detent.cell import hardware, tables
@@ -58,6 +58,26 @@ def adapter(kind: type[Kind]) -> TypeAdapter[Kind]:
         made = _adapters[kind] = TypeAdapter(kind)
         made.rebuild(_types_namespace=_NAMES)
     return made
+
+
+def hints(table: type[Any]) -> dict[str, Any]:
+    """What the fields of a table take, as `typing` has it, with what is asked of them beyond."""
+    found = get_type_hints(table, localns=_NAMES, include_extras=True)
+    if is_dataclass(table):
+        return found
+    for name, field in cast("type[BaseModel]", table).model_fields.items():
+        if field.metadata and get_origin(found[name]) is not Annotated:  # bounds that stand with the default
+            found[name] = Annotated[found[name], Field(**_limits(field.metadata))]
+    return found
+
+
+def _limits(metadata: Sequence[object]) -> dict[str, Any]:
+    return {
+        name: value
+        for one in metadata
+        for name in ("gt", "ge", "lt", "le")
+        if (value := getattr(one, name, None)) is not None
+    }
 
 
 def _tables(kind: type[Any]) -> dict[str, type[Any]]:

@@ -55,11 +55,17 @@ class _Table(BaseModel):
 class Board(_Table):
     """``[boards.NAME]``: a board with stock Klipper firmware, and how it is driven."""
 
-    serial: str  # the device; a name in /dev/serial/by-id stays the same whatever is plugged in when
-    lead: DurationField = 30 * MS  # what leaves the pins is so long behind the cell
-    error: ErrorField = 1 * US  # of a pulse, at most
-    watchdog: DurationField = 2 * SECOND  # enable pins let go when nobody has refreshed them for so long
-    replies: Literal["held", "at once"] = "held"  # until nothing can change them any more
+    serial: str
+    """The device: a name in `/dev/serial/by-id` stays the same whatever is plugged in when; `fake:` is a board of our
+    own that moves nothing."""
+    lead: DurationField = 30 * MS
+    """What leaves the pins is so long behind the cell: 3 to 500 ms, the same on all boards of a cell."""
+    error: ErrorField = 1 * US
+    """How far a pulse may be from its time, 100 us at most; `exact`: the nearest tick."""
+    watchdog: DurationField = 2 * SECOND
+    """`enable` pins let go when nobody has refreshed them for so long: 200 ms and four leads at least."""
+    replies: Literal["held", "at once"] = "held"
+    """Hosts hear what is said when nothing can change it any more, a lead and 5 ms later; or at once."""
 
     @model_validator(mode="after")
     def _sane(self) -> "Board":
@@ -77,20 +83,35 @@ class Driver(_Table):
     """How a stepper driver gets its current: a chip whose registers are set, or a plain one with an input for half."""
 
     kind: Literal["plain", "tmc2208", "tmc2209", "tmc2130", "tmc5160"]
-    half: OutPin | None = None  # plain: high while at most half of the current is wanted
-    amperes: Annotated[Number, Field(gt=0)] | None = None  # of a phase, for full power; a controller may command them
-    sense: Annotated[Number, Field(gt=0)] = 0.11  # ohm
-    microsteps: Literal[1, 2, 4, 8, 16, 32, 64] | None = None  # pulses a full step, of a controller that commands none
+    """A chip whose registers are set, or a plain driver with an input that halves its current."""
+    half: OutPin | None = None
+    """Plain: high while half of the current will do."""
+    amperes: Annotated[Number, Field(gt=0)] | None = None
+    """A: of a phase, for full power; a controller may command them."""
+    sense: Annotated[Number, Field(gt=0)] = 0.11
+    """Ohm: the sense resistors."""
+    microsteps: Literal[1, 2, 4, 8, 16, 32, 64] | None = None
+    """Pulses a full step, under a controller that commands none."""
     uart: InPin | None = None
+    """tmc2208, tmc2209: the pin of the UART."""
     transmit: OutPin | None = None
+    """The pin that sends, where it is not that of `uart`."""
     address: Annotated[int, Field(ge=0, le=3)] = 0
+    """tmc2209: of several on one UART."""
     select: OutPin | None = None
+    """tmc2130, tmc5160: the pin that selects the chip; `bus` goes with it, or `clock`, `mosi` and `miso`."""
     bus: str | None = None
+    """A name of the board's own SPI."""
     clock: OutPin | None = None
+    """SPI by three pins."""
     mosi: OutPin | None = None
+    """SPI by three pins."""
     miso: InPin | None = None
+    """SPI by three pins."""
     quiet: bool = False
+    """StealthChop instead of SpreadCycle."""
     interpolate: bool = True
+    """The chip makes 256 microsteps of those that it is given."""
 
     @model_validator(mode="after")
     def _fits(self) -> "Driver":
@@ -124,17 +145,29 @@ class Hardware(_Table):
     """
 
     board: str
+    """The board they are on."""
     step: OutPin | None = None
+    """Step clock; left out in a table that a unit with several axes shares."""
     dir: OutPin | None = None
-    minus: OutPin | None = None  # the clock of the minus direction, of two; dir then is a pin that nothing hangs on
-    enable: OutPin | None = None  # of the driver: on while the unit is
-    pulse: DurationField | None = None  # how long it lasts at least
-    outputs: dict[str, OutPin] = {}  # of the controller, by its name for them
+    """Direction, high for plus."""
+    minus: OutPin | None = None
+    """The clock of the minus direction, of a driver with two; `dir` then is a pin with nothing on it."""
+    enable: OutPin | None = None
+    """Of the driver: on while the unit is."""
+    pulse: DurationField | None = None
+    """How long a step pulse is at least, and the direction holds behind it; left out: the controller's."""
+    outputs: dict[str, OutPin] = {}
+    """Outputs of the controller, by its names."""
     inputs: dict[str, InPin] = {}
-    unwired: Names = []  # switches that this machine does not have
-    sample: DurationField = 50 * US  # between two looks at an input that stops the axis
-    samples: Annotated[int, Field(ge=1, le=255)] = 2  # alike, before it does
+    """Inputs of the controller; one that is wired here takes no wire, no switch and no script."""
+    unwired: Names = []
+    """Limit and home switches that this machine does not have."""
+    sample: DurationField = 50 * US
+    """An input that stops an axis is looked at so often: 10 us to 10 ms."""
+    samples: Annotated[int, Field(ge=1, le=255)] = 2
+    """And believed after so many looks that are alike."""
     driver: Driver | None = None
+    """How a stepper driver gets its current: a table `driver`."""
 
     @model_validator(mode="after")
     def _whole(self) -> "Hardware":

@@ -18,19 +18,28 @@ class Wire(_Table):
     """``[[wires]]``: an output to one input or several."""
 
     source: str = Field(validation_alias=AliasChoices("from"))
+    """UNIT.PIN: an output."""
     to: Names
+    """UNIT.PIN: inputs; also straps, which are read at power-on."""
 
 
 class Switch(_Table):
     """``[switches.NAME]``: a contact that drives pins, set by the script or by an axis."""
 
     drives: Names
-    level: LevelField = HIGH  # when the cell starts; an axis decides for itself
-    axis: str | None = None  # the unit (UNIT.AXIS where it has several), or the motor, whose axis moves the contact
-    start: Steps | Number | None = Field(None, validation_alias=AliasChoices("from"))  # steps; on a motor, its distance
+    """UNIT.PIN: the inputs, which nothing else may drive."""
+    level: LevelField = HIGH
+    """When the cell starts; on an axis the place decides."""
+    axis: str | None = None
+    """The unit whose axis moves the contact, UNIT.AXIS where it has several; or a motor, whose rotor moves it."""
+    start: Steps | Number | None = Field(None, validation_alias=AliasChoices("from"))
+    """Steps, on a motor with `lead` a distance: the first place of the range; left out: no end there."""
     end: Steps | Number | None = Field(None, validation_alias=AliasChoices("to"))
-    at: Steps | None = None  # the same as from and to
-    inside: LevelField = LOW  # the level between from and to
+    """The last place of the range; left out: no end there."""
+    at: Steps | None = None
+    """A range of one step: the same as `from` and `to`."""
+    inside: LevelField = LOW
+    """The level within the range; outside it is the other one."""
 
     @model_validator(mode="after")
     def _placed(self) -> "Switch":
@@ -55,11 +64,17 @@ class Current(_Table):
     """The phase current, A: ramp, slew, rest by MOV and RAMP, or run, and hold `after` the last step."""
 
     ramp: float = 0.0
+    """A: while the controller ramps, by its pin RAMP, which is wired; then `slew` and `rest` go with it."""
     slew: float = 0.0
+    """A: while it moves otherwise, by its pin MOV."""
     rest: float = 0.0
+    """A: while it stands."""
     run: float = 0.0
+    """A: while it moves; then `hold` and `after` go with it."""
     hold: float = 0.0
+    """A: while it stands."""
     after: DurationField = 0
+    """How long behind the last step it is `run` still."""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> "Current":
@@ -71,27 +86,52 @@ class Current(_Table):
 class Motor(_Table):
     """``[motors.NAME]``: a motor with drive and load on the axis of a unit, or on step pulses that a wire brings."""
 
-    motor: str = ""  # by name; without one the `data` are all of it
+    motor: str = ""
+    """One of `detent motor`, or a [TOML file of your own](motors.md#your-own-motor-and-mechanics) beside this one; left
+    out, `data` is all of it."""
     unit: str | None = None
-    axis: str = ""  # where the unit has several
-    supply: float  # V
-    current: float | Current | None = None  # A in each phase with both on; the motor's rating
+    """Whose pulses it gets; left out: steps come over its pins CLOCK and DIR."""
+    axis: str = ""
+    """Of a unit that has several."""
+    supply: float
+    """V: of the drive."""
+    current: float | Current | None = None
+    """A with both phases on, or a table `current`; left out: the motor's rating."""
     step: str = "half"
+    """full, wave, half, half-compensated, or 1/2 to 1/64."""
     decay: Literal["fast", "slow", "mixed", "auto", "voltage"] = "fast"
-    drive: str = ""  # by name (tmc2209, a4988, ...): its decay, its switches, whether it interpolates
-    threshold: float = 0.0  # full steps/s from which on decay is fast (auto)
-    drop: float = 0.0  # V in the switches
-    resistance: float = 0.0  # ohm of switches and wires
-    fitted: bool = False  # to the maker's torque curve
-    wiring: Literal["", "series", "parallel", "unipolar"] = ""  # of a motor that is sold for several; as it is named
-    damping: Number | None = None  # ratio of the bare rotor; None: the motor's own, or what is usual with the drive
-    data: dict[str, Steps | Number | str] = {}  # an own motor, or what is different in the named one: SI units
+    """Of the current: `auto` goes with `threshold`; `voltage` is pulse width without current feedback."""
+    drive: str = ""
+    """By name, in place of `decay`: [which there are](motors.md#drives)."""
+    threshold: float = 0.0
+    """Full steps/s from which on decay is fast, with `auto`."""
+    drop: float = 0.0
+    """V: lost in the switches."""
+    resistance: float = 0.0
+    """Ohm: of switches and wires."""
+    fitted: bool = False
+    """Inductance and friction are fitted to the maker's torque curve."""
+    wiring: Literal["", "series", "parallel", "unipolar"] = ""
+    """Of a motor that is sold for several."""
+    damping: Number | None = None
+    """A ratio: of the bare rotor, about the speed of the pulses; left out: 0.12 for a chopper, 0.03 for `voltage`
+    ([why](motors.md#how-far-to-believe-it))."""
+    data: dict[str, Steps | Number | str] = {}
+    """A motor of your own, or what is different in the named one, in SI units: `resistance`, `inductance`, `current`,
+    `holding_torque` (these four are needed), `inertia`, `steps` and what else `detent motor` knows."""
     load: dict[Literal["inertia", "friction", "viscous", "torque"], Annotated[float, Field(ge=-1e6, le=1e6)]] = {}
-    mechanics: dict[str, Number] = {}  # screw, belt, rack, gear, mass, ...: what `detent.motors.mechanics` takes
+    """kg m2, Nm, Nm s/rad, Nm."""
+    mechanics: dict[str, Number] = {}
+    """Added to `load`: screw (m a turn), belt or rack (radius, m), gear, mass (kg), slope (degrees), force, drag (N),
+    efficiency, driven_inertia and what else `detent motor` takes."""
     load_by: dict[Literal["s", "turns", "m"], Annotated[list[tuple[Number, Number]], Field(max_length=100_000)]] = {}
-    lead: Number | None = None  # distance a step: then places of switches are distances
-    reverse: bool = False  # plus turns the motor the other way
-    window: float = Field(0.5, gt=0, le=4)  # steps that the step detector takes for made
+    """A torque that changes: points of seconds, turns or metres, from where the rotor stands at first, and Nm."""
+    lead: Number | None = None
+    """Distance a step: then switches with `axis` = this motor are placed in distances. Not 0."""
+    reverse: bool = False
+    """Plus turns the motor the other way."""
+    window: float = Field(0.5, gt=0, le=4)
+    """Steps: how far short of a step the step detector (pin DONE) takes it for made."""
 
     @model_validator(mode="after")
     def _known(self) -> "Motor":
@@ -106,9 +146,14 @@ class Line(_Table):
     """``[lines.NAME]``: the units on one serial line, and where a host finds it."""
 
     units: Names
-    endpoint: str | None = None  # 'pty', 'pty:LINK', 'tcp:HOST:PORT' or 'serial:DEVICE'
-    host: str | None = None  # the unit that is the host of this line: an adapter, which has a line of its own
-    kind: str | None = None  # 'daisy-chain': the host to the first unit, each unit to the next, the last to the host
+    """Who is on the line, in order; the last has TXPD tied unless straps say otherwise."""
+    endpoint: str | None = None
+    """Where `serve` puts it: `pty`, `pty:LINK`, `tcp:HOST:PORT`, `rfc2217:HOST:PORT`, `serial:DEVICE`; left out: a
+    pseudo-terminal."""
+    host: str | None = None
+    """The adapter that is the host of this line: [SIN-8, SIN-10](../controllers/dcb274.md#serial-modes)."""
+    kind: str | None = None
+    """`daisy-chain`: host to first unit, each unit to the next, the last one to the host."""
 
     @model_validator(mode="after")
     def _sane(self) -> "Line":
@@ -125,10 +170,15 @@ class ScriptEntry(_Table):
     """``[[script]]``: what is done to the cell at a time."""
 
     at: DurationField
-    set: dict[str, LevelField] = {}  # switches, or inputs that nothing else drives
-    send: Names = []  # command lines, to the unit `to`
+    """Since the start of the cell."""
+    set: dict[str, LevelField] = {}
+    """Levels of switches; or of UNIT.PIN, an input that nothing else drives (1 until then)."""
+    send: Names = []
+    """Command lines for `to`; address, checksum and CR are added."""
     to: str | None = None
+    """The unit that `send` is for."""
     power: dict[str, bool] = {}
+    """Switch the supply of a unit; straps are read and volatile memory is empty at power-on."""
 
     @model_validator(mode="after")
     def _something(self) -> "ScriptEntry":
