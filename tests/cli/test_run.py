@@ -271,7 +271,6 @@ def test_a_line_that_a_busy_module_turns_down_is_told_and_one_that_waits_for_idl
     assert json.loads(capsys.readouterr().out)["units"]["gs-c200"]["position"] == 100
 
 
-
 @pytest.mark.parametrize(
     ("tokens", "message"),
     [

@@ -11,6 +11,8 @@ import pytest
 from pydantic import BaseModel
 
 from detent.cell import description, form
+from detent.cell.build import build
+from detent.cell.description import Problem, parse
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
