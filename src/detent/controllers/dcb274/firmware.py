@@ -8,7 +8,6 @@ what both can do, `motion` the axis, `ports` the pins. Here they meet, and whate
 from collections import deque
 from collections.abc import Mapping, Sequence
 
-from detent.axis import Axis
 from detent.controllers.dcb274 import current, pins, program, settings
 from detent.controllers.dcb274.commands import MODEL
 from detent.controllers.dcb274.desk import VERSION, Desk, Stage
@@ -34,17 +33,18 @@ from detent.controllers.dcb274.running import Running
 from detent.controllers.dcb274.settings import Settings
 from detent.controllers.dcb274.trip import Trip
 from detent.controllers.dcb274.work import Work, position
-from detent.controllers.device import Output, Powered, StageSet, Status, Stop, StoreImage
-from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PulseOutput
+from detent.controllers.device import StageSet, Status, Stop, StoreImage
+from detent.controllers.powered import OneAxis
+from detent.pins import HIGH, LOW, Level, Pin, PulseOutput
 from detent.ticks import NEVER, Ns
-from detent.uart import Char, Format, SerialPort, Transmitter
+from detent.uart import Char, Format, SerialPort
 
 SIGN_ON = f"    110 AMS SMC-27X2 {VERSION}\r\n"  # behind the echoed space
 CONFLICT = "GO-SS conflict\r\n"
 _CONTACTS = ("GO", "JOG1", "JOG2")
 
 
-class Dcb274:
+class Dcb274(OneAxis):
     """One DCB-274. Straps that are not named are `pins.DEFAULT_STRAPS`."""
 
     model = MODEL
@@ -61,11 +61,9 @@ class Dcb274:
         line_timing: bool = True,
         shaft: int = 0,
     ) -> None:
+        super().__init__(shaft, line_timing=line_timing)
         self._straps = {**pins.DEFAULT_STRAPS, **(straps or {})}
-        self._overrun, self._line_timing, self._p4_input = overrun and line_timing, line_timing, p4_input
-        self._out: list[Output] = []
-        self._driver = PinDriver(self._out)
-        self._axis = Axis(self._out, shaft)
+        self._overrun, self._p4_input = overrun and line_timing, p4_input
         self._settings = Settings(name)
         self.memory = Memory(settings.factory(name))
         self._ports = Ports(self._driver, self._settings, p4_input)
@@ -76,7 +74,6 @@ class Dcb274:
         self._desk = Desk(self._work, self._running, self, self._out)
         self._set_inputs: set[str] = set()  # that something drives: the others follow the PLC jumper
         self._base = 0  # of the program that was loaded
-        self._powered = False
         self._staged: tuple[int, int, tuple[int, int], int] | None = None  # what was last told of the power stage
         self._quiet = False  # nothing is under way: characters for others need no more than a look
         self._inbox: deque[int] = deque()  # characters that wait until a command has executed
@@ -96,33 +93,25 @@ class Dcb274:
         self._shown = 0  # the position printed last, for Z 1
         self._readout_at: Ns = NEVER
 
-    def _new_transmitter(self) -> Transmitter:
-        return Transmitter(pins.SERIAL_PORT.sends, self.line_format, self._out, timed=self._line_timing)
-
     # -- the contract ------------------------------------------------------------------------------------
 
-    def power(self, on: bool, now: Ns) -> None:
-        """Switch the supply; jumpers count from power-on, PARTY from every reset."""
-        self.advance(now)
-        if on == self._powered:
-            return
+    def _switch_on(self, now: Ns) -> None:
+        """Jumpers count from power-on, PARTY from every reset."""
         self._quiet = False
-        self._powered = on
         self._transmitter = self._new_transmitter()
-        self._out.append(Powered(now, on))
-        if on:
-            for pin in set(pins.INPUTS) - self._set_inputs:
-                self._ports.levels[pin] = LOW if self._straps["PLC"] == HIGH else HIGH
-            self._reset(now, party=False)
-            return
+        for pin in set(pins.INPUTS) - self._set_inputs:
+            self._ports.levels[pin] = LOW if self._straps["PLC"] == HIGH else HIGH
+        self._reset(now, party=False)
+
+    def _switch_off(self, now: Ns) -> None:
+        self._quiet = False
+        self._transmitter = self._new_transmitter()
         self._staged = None
-        if self._axis.moving:
-            self._axis.cut(now)
+        self._cut(now)
         self._motion.reset()
         self._running.reset()
         self._desk.reset()
         self._forget()
-        self._driver.release()
 
     def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
         """Characters on RX whose stop bits end at `now`."""
@@ -188,37 +177,33 @@ class Dcb274:
         self._poll(now)
         self.advance(now)
 
+    # On a line with names every character reaches every unit: these two cost most of what a line costs.
+
     def next_deadline(self) -> Ns | None:
         """The earliest of: motion, program, command, next character out, readout."""
-        if self._quiet:
+        if self._quiet or (deadline := self._next()) >= NEVER:
             return None
-        deadline = self._next()
-        return None if deadline >= NEVER else deadline
+        return deadline
 
     def advance(self, now: Ns) -> None:
         """Do what is due, in order of time; in one instant steps come first."""
         if self._quiet:
             return
         while (at := self._next()) <= now:
-            if self._motion.deadline <= at:
-                self._heed(self._motion.advance(at), at)
-            elif self._running.timer <= at:
-                self._running.advance(at)
-            elif self._desk.timer <= at:
-                self._desk.advance(at)
-            elif self._transmitter.deadline <= at:
-                self._transmitter.advance(at)
-                continue
-            self._poll(at)
+            self._do_due(at)
         self._rest()
 
-    def drain(self) -> list[Output]:
-        """What the unit did since the last call."""
-        if not self._out:
-            return []
-        out = self._out.copy()
-        self._out.clear()
-        return out
+    def _do_due(self, at: Ns) -> None:
+        if self._motion.deadline <= at:
+            self._heed(self._motion.advance(at), at)
+        elif self._running.timer <= at:
+            self._running.advance(at)
+        elif self._desk.timer <= at:
+            self._desk.advance(at)
+        elif self._transmitter.deadline <= at:
+            self._transmitter.advance(at)
+            return
+        self._poll(at)
 
     def watch(self, pin: str) -> None:
         """A wire leads from P4 or STEPS: give each of its pulses as an event."""
@@ -248,11 +233,6 @@ class Dcb274:
     def straps(self) -> Mapping[str, Level]:
         """How its straps are tied now."""
         return self._straps
-
-    @property
-    def axes(self) -> Sequence[str]:
-        """One axis, without a name."""
-        return ("",)
 
     @property
     def line_format(self) -> Format:
@@ -373,17 +353,11 @@ class Dcb274:
             self._interrupt(ord("|"), now)
             self._poll(now)
 
-    def displace(self, by: int, now: Ns, axis: str = "") -> None:
-        """The shaft is elsewhere."""
-        self.advance(now)
-        self._axis.displace(by)
-
     # -- reset -------------------------------------------------------------------------------------------
 
     def _reset(self, now: Ns, *, party: bool) -> None:
         """Power-on, ^C, ^P: registers from NV memory, outputs off, position 0, and the routine at 1600."""
-        if self._axis.moving:
-            self._axis.cut(now)
+        self._cut(now)
         self.memory.load_shadow()
         self._settings.load(self.memory)
         self._motion.reset()

@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any
 
 from detent.axis import Axis
-from detent.controllers.device import DriveSet, Output, Powered, Refused, Status, Stop
+from detent.controllers.device import DriveSet, Refused, Status, Stop
 from detent.controllers.genstepper import link, pins, reports
 from detent.controllers.genstepper.direct import Direct
 from detent.controllers.genstepper.inputs import FIRST_RATE, STANDARD_RATES, Keys, Limits, keys
@@ -18,7 +18,8 @@ from detent.controllers.genstepper.prompter import Prompter
 from detent.controllers.genstepper.supply import WINDING_CURRENT
 from detent.controllers.genstepper.windings import CYCLE, Duties
 from detent.controllers.genstepper.windings import drive as winding_drive
-from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind, PulseOutput
+from detent.controllers.powered import PoweredDevice
+from detent.pins import HIGH, LOW, Level, Pin, PinKind, PulseOutput
 from detent.ticks import MS, NEVER, Ns
 from detent.uart import Format, SerialPort
 
@@ -34,7 +35,7 @@ class Phase(Enum):
     READY = "ready"
 
 
-class Board:
+class Board(PoweredDevice):
     """A board without its commands: all of its state, and what moves it from outside but characters.
 
     Straps that are not named are open, JS installed; `order` are fields of `pins.Order`.
@@ -44,13 +45,11 @@ class Board:
         self, model: str, straps: Mapping[str, Level] | None = None, *, line_timing: bool = True, shaft: int = 0,
         **order: Any,
     ) -> None:  # fmt: skip
+        super().__init__(line_timing=line_timing)
         self.model = model
         self._order = Order(**order)
         self._straps = {**pins.DEFAULT_STRAPS[model], **(straps or {})}
-        self._line_timing = line_timing
         self._inputs: dict[str, Level] = {pin.name: pin.rest for pin in self.pins if pin.kind is PinKind.INPUT}
-        self._out: list[Output] = []
-        self._driver = PinDriver(self._out)
         self._limits = Limits(self._inputs, self._order.hard_stop)
         self._motors = {axis: Motor(Axis(self._out, shaft, axis), self._limits) for axis in AXES}
         self._direct = Direct(self._inputs)
@@ -87,23 +86,16 @@ class Board:
 
     # -- the contract ------------------------------------------------------------------------------------
 
-    def power(self, on: bool, now: Ns) -> None:
-        """Switch the supply."""
-        self.advance(now)
-        if on == (self._phase is not Phase.OFF):
-            return
-        if on:
-            self._out.append(Powered(now, on))
-            for pin in self.pins:
-                if pin.kind is PinKind.OUTPUT:
-                    self._driver.set(pin.name, pin.rest, now)
-            self._reset(self._order.step_size, now)
-            self._settle(now)
-        else:
-            self._phase = Phase.OFF
-            self._clear(now, self._order.step_size)
-            self._out.append(Powered(now, on))
-            self._driver.release()
+    def _switch_on(self, now: Ns) -> None:
+        for pin in self.pins:
+            if pin.kind is PinKind.OUTPUT:
+                self._driver.set(pin.name, pin.rest, now)
+        self._reset(self._order.step_size, now)
+        self._settle(now)
+
+    def _switch_off(self, now: Ns) -> None:
+        self._phase = Phase.OFF
+        self._clear(now, self._order.step_size)
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
         """An input takes a level; SI low is the start bit of a character. Jumpers count at the next reset."""
@@ -136,30 +128,17 @@ class Board:
     def stored(self, ok: bool, now: Ns) -> None:
         """It stores nothing."""
 
-    def next_deadline(self) -> Ns | None:
-        """The earliest of: the end of a reset, motion, step lines, next character out."""
-        deadline = self._next()
-        return None if deadline >= NEVER else deadline
-
-    def advance(self, now: Ns) -> None:
-        """Do what is due, in order of time: steps first, then the rest."""
-        while (at := self._next()) <= now:
-            for motor in self._motors.values():
-                if motor.deadline <= at:
-                    motor.advance(at)
-            if self._direct.deadline <= at:
-                self._steps(at)
-            if self._wakes <= at:
-                self._wake(at)
-            self._settle(at)
-            if self._prompter.deadline <= at:
-                self._prompter.advance(at)
-
-    def drain(self) -> list[Output]:
-        """What the board did since the last call."""
-        out = self._out.copy()
-        self._out.clear()
-        return out
+    def _do_due(self, at: Ns) -> None:
+        for motor in self._motors.values():
+            if motor.deadline <= at:
+                motor.advance(at)
+        if self._direct.deadline <= at:
+            self._steps(at)
+        if self._wakes <= at:
+            self._wake(at)
+        self._settle(at)
+        if self._prompter.deadline <= at:
+            self._prompter.advance(at)
 
     def watch(self, pin: str) -> None:
         """A wire leads from a winding: give its level at every step."""

@@ -7,19 +7,19 @@ in `_OBEY` -> `prompter` answers. Motion is `motor`'s; everything else that a co
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
-from detent.assembler import ImageError
 from detent.controllers.device import Refused
 from detent.controllers.genstepper import commands, link, reports
 from detent.controllers.genstepper.board import Board, Phase, high_byte
 from detent.controllers.genstepper.commands import Op
 from detent.controllers.genstepper.motor import DEFAULT_RATE, DEFAULT_SLOPE, LEAST_KEPT, Motor
 from detent.controllers.genstepper.pins import AXES
+from detent.controllers.powered import WithoutPrograms
 from detent.ramps.tick_accumulator import UPDATES
 from detent.ticks import Ns
 from detent.uart import Char
 
 
-class GenStepper(Board):
+class GenStepper(Board, WithoutPrograms):
     """One BS0610 or BS0710. Straps that are not named are open, JS installed; `order` are fields of `pins.Order`."""
 
     # -- the contract, as far as `Board` does not keep it --------------------------------------------
@@ -52,25 +52,6 @@ class GenStepper(Board):
                       f"{axis} O": str(motor.mode), f"{axis} M": str(motor.mark),
                       f"{axis} G": str(motor.seen_target(now))}  # fmt: skip
         return found
-
-    def program_memory(self) -> bytes:
-        """It holds no program."""
-        return b""
-
-    def kept_memory(self) -> bytes:
-        """It keeps nothing."""
-        return b""
-
-    def restore(self, image: bytes) -> None:
-        """It has no non-volatile memory."""
-        raise ImageError(f"a {self.model} keeps nothing: it has no image")
-
-    def load(self, image: bytes, base: int, now: Ns) -> None:
-        """It holds no program."""
-        raise ImageError(f"a {self.model} holds no programs")
-
-    def start(self, now: Ns) -> None:
-        """It holds no program."""
 
     # -- characters --------------------------------------------------------------------------------------
 

@@ -8,8 +8,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
-from detent.axis import Axis
-from detent.controllers.device import Output, Powered, Refused, Status, Stop, StoreImage
+from detent.controllers.device import Refused, Status, Stop, StoreImage
 from detent.controllers.gsc200 import commands, pins, program
 from detent.controllers.gsc200.commands import GS_C200S, CommandError, Instruction, Op
 from detent.controllers.gsc200.counter import PositionCounter
@@ -17,15 +16,16 @@ from detent.controllers.gsc200.link import Frame, Link
 from detent.controllers.gsc200.motion import Motion
 from detent.controllers.gsc200.program import Program, ProgramFull
 from detent.controllers.gsc200.running import Running
-from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind, PulseOutput
-from detent.ticks import MS, NEVER, Ns
-from detent.uart import Char, Format, SerialPort, Transmitter
+from detent.controllers.powered import OneAxis
+from detent.pins import HIGH, LOW, Level, Pin, PinKind, PulseOutput
+from detent.ticks import MS, Ns
+from detent.uart import Char, Format, SerialPort
 
 INSTRUCTION_TIME: Ns = 1 * MS  # our assumption: no loop takes no time, no output pulse has no width
 FIRST_ORED_REVISION = (2, 2)  # of the GS-C200: from here on the checksum is ORed with 10h
 
 
-class GsC200:
+class GsC200(OneAxis):
     """One GS-C200 or GS-C200S module. Straps that are not named are `pins.DEFAULT_STRAPS`."""
 
     def __init__(
@@ -39,20 +39,16 @@ class GsC200:
         line_timing: bool = True,
         shaft: int = 0,
     ) -> None:
+        super().__init__(shaft, line_timing=line_timing)
         self.model = model
         self._separate_clocks = separate_clocks
         self._straps = {**pins.DEFAULT_STRAPS, **(straps or {})}
         self._clears_on_home = model != GS_C200S
         self._ored = model == GS_C200S or revision >= FIRST_ORED_REVISION
         self._instruction_time = instruction_time
-        self._line_timing = line_timing
         self._inputs: dict[str, Level] = {pin.name: pin.rest for pin in self.pins if pin.kind is PinKind.INPUT}
         self._eeprom = program.empty(model)
-        self._out: list[Output] = []
-        self._driver = PinDriver(self._out)
-        self._axis = Axis(self._out, shaft)
         self._motion = Motion(self._axis, self._driver, self._inputs, self.pulse_output)
-        self._powered = False
         self._reset()
 
     def _reset(self) -> None:
@@ -60,7 +56,7 @@ class GsC200:
         straps = self._straps
         self._form = pins.character_format(straps)
         self._link = Link(pins.address(straps), straps["CHS"] == HIGH, self._ored)
-        self._transmitter = Transmitter(pins.SERIAL_PORT.sends, self.line_format, self._out, timed=self._line_timing)
+        self._transmitter = self._new_transmitter()
         self._deaf = False  # no reception: REC low and RXD tied high, or TEST not grounded
         self._inbox: deque[Char] = deque()  # characters behind an M that is being stored
         self._storing: Program | None = None
@@ -75,19 +71,9 @@ class GsC200:
 
     # -- the contract ------------------------------------------------------------------------------------
 
-    def power(self, on: bool, now: Ns) -> None:
-        """Switch the supply; straps are read, and with REC low the stored program recalled, at power-on."""
-        self.advance(now)
-        if on == self._powered:
-            return
-        self._powered = on
-        if self._axis.moving:
-            self._axis.cut(now)
-        self._out.append(Powered(now, on))
+    def _switch_on(self, now: Ns) -> None:
+        """Straps are read, and with REC low the stored program recalled."""
         self._reset()
-        if not on:
-            self._driver.release()
-            return
         for pin in self.pins:
             if pin.kind.drives and pin.name != "RESET":
                 self._driver.set(pin.name, pin.rest, now)
@@ -98,6 +84,10 @@ class GsC200:
             self._out.append(Refused(now, "TEST", "pin 10 must be grounded for normal operation: nothing is obeyed"))
         elif self._straps["REC"] == LOW:
             self._recall(now)
+
+    def _switch_off(self, now: Ns) -> None:
+        self._cut(now)
+        self._reset()
 
     def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
         """Characters on RXD whose stop bits end at `now`."""
@@ -127,27 +117,14 @@ class GsC200:
             self._answer("Y" if ok else "E6", now)
             self._read(now)
 
-    def next_deadline(self) -> Ns | None:
-        """The earliest of: instruction, motion, next character out, kept frame."""
-        deadline = self._next()
-        return None if deadline >= NEVER else deadline
-
-    def advance(self, now: Ns) -> None:
-        """Do what is due, in order of time."""
-        while (at := self._next()) <= now:
-            if self._running.deadline <= at:
-                self._running.advance(at)
-            elif self._transmitter.deadline <= at:
-                self._transmitter.advance(at)
-            elif self._kept is not None:
-                frame, self._kept = self._kept, None
-                self._handle(frame, at)
-
-    def drain(self) -> list[Output]:
-        """What the module did since the last call."""
-        out = self._out.copy()
-        self._out.clear()
-        return out
+    def _do_due(self, at: Ns) -> None:
+        if self._running.deadline <= at:
+            self._running.advance(at)
+        elif self._transmitter.deadline <= at:
+            self._transmitter.advance(at)
+        elif self._kept is not None:
+            frame, self._kept = self._kept, None
+            self._handle(frame, at)
 
     def watch(self, pin: str) -> None:
         """A wire leads from a clock output: give each pulse as an event."""
@@ -175,11 +152,6 @@ class GsC200:
     def straps(self) -> Mapping[str, Level]:
         """How its straps are tied now."""
         return self._straps
-
-    @property
-    def axes(self) -> Sequence[str]:
-        """One axis, without a name."""
-        return ("",)
 
     @property
     def line_format(self) -> Format:
@@ -251,11 +223,6 @@ class GsC200:
         self.advance(now)
         if self._running.busy:
             self._running.kill(now)
-
-    def displace(self, by: int, now: Ns, axis: str = "") -> None:
-        """The shaft is elsewhere."""
-        self.advance(now)
-        self._axis.displace(by)
 
     # -- frames ------------------------------------------------------------------------------------------
 

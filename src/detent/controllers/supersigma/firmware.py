@@ -6,25 +6,24 @@ clock of the rate generator, which starts with each movement.
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar, NoReturn
+from typing import ClassVar
 
-from detent.assembler import ImageError
-from detent.axis import Axis
-from detent.controllers.device import Cautioned, Output, Powered, Refused, Status, Stop
+from detent.controllers.device import Cautioned, Output, Refused, Status, Stop
+from detent.controllers.powered import OneAxis, WithoutPrograms
 from detent.controllers.supersigma import commands, link, pins
 from detent.controllers.supersigma.commands import Command, Op
 from detent.controllers.supersigma.link import Link
 from detent.controllers.supersigma.motion import Motion
 from detent.controllers.supersigma.program import BRAKING, OFFSET, Program
-from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind, PulseOutput
+from detent.pins import HIGH, LOW, Level, Pin, PinKind, PulseOutput
 from detent.ramps.differences import PAPER, Differences
 from detent.ramps.rate_generator import CLOCK_HZ
 from detent.ramps.ways import Way
-from detent.ticks import NEVER, Ns, show_duration
+from detent.ticks import Ns, show_duration
 from detent.uart import Char, Format, Sent, SerialPort, Transmitter
 
 
-class Supersigma:
+class Supersigma(OneAxis, WithoutPrograms):
     """One SUPERSIGMA drive with the given number on the bus. It has no straps."""
 
     model = "supersigma"
@@ -41,14 +40,10 @@ class Supersigma:
         line_timing: bool = True,
         shaft: int = 0,
     ) -> None:
+        super().__init__(shaft, line_timing=line_timing)
         self.number = number
-        self._line_timing = line_timing
         self._inputs: dict[str, Level] = {pin.name: pin.rest for pin in pins.PINS if pin.kind is PinKind.INPUT}
-        self._out: list[Output] = []
-        self._driver = PinDriver(self._out)
-        self._axis = Axis(self._out, shaft)
         self._motion = Motion(self._axis, self._driver, self._inputs, Program(table, offset, short, braking))
-        self._powered = False
         self._reset()
 
     def _reset(self) -> None:
@@ -63,21 +58,15 @@ class Supersigma:
 
     # -- the contract ------------------------------------------------------------------------------------
 
-    def power(self, on: bool, now: Ns) -> None:
-        """Switch the supply."""
-        self.advance(now)
-        if on == self._powered:
-            return
-        self._powered = on
-        self._motion.cut(now)
-        self._out.append(Powered(now, on))
+    def _switch_on(self, now: Ns) -> None:
         self._reset()
-        if not on:
-            self._driver.release()
-            return
         for pin in pins.PINS:
             if pin.kind.drives:
                 self._driver.set(pin.name, pin.rest, now)
+
+    def _switch_off(self, now: Ns) -> None:
+        self._cut(now)
+        self._reset()
 
     def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
         """Bytes of the CCU that are taken at `now`."""
@@ -123,29 +112,16 @@ class Supersigma:
     def stored(self, ok: bool, now: Ns) -> None:
         """The EPROM is not written in the circuit."""
 
-    def next_deadline(self) -> Ns | None:
-        """The earliest of: motion, next byte of an answer, its strobe, the end of waiting for the rest of a message."""
-        deadline = self._next()
-        return None if deadline >= NEVER else deadline
-
-    def advance(self, now: Ns) -> None:
-        """Do what is due, in order of time."""
-        while (at := self._next()) <= now:
-            if self._motion.deadline <= at:
-                self._motion.advance(at)
-            elif self._link.deadline <= at:
-                self._drop(f"no byte came for {show_duration(link.SILENCE)}", at)
-            elif self._strobes and self._strobes[0][0] <= at:
-                self._driver.set(pins.ANSWER, self._strobes.popleft()[1], at)
-            else:
-                self._transmitter.advance(at)
-                self._put_on_bus()
-
-    def drain(self) -> list[Output]:
-        """What the drive did since the last call."""
-        out = self._out.copy()
-        self._out.clear()
-        return out
+    def _do_due(self, at: Ns) -> None:
+        if self._motion.deadline <= at:
+            self._motion.advance(at)
+        elif self._link.deadline <= at:
+            self._drop(f"no byte came for {show_duration(link.SILENCE)}", at)
+        elif self._strobes and self._strobes[0][0] <= at:
+            self._driver.set(pins.ANSWER, self._strobes.popleft()[1], at)
+        else:
+            self._transmitter.advance(at)
+            self._put_on_bus()
 
     def watch(self, pin: str) -> None:
         """A wire leads from the step output: give each pulse as an event."""
@@ -179,11 +155,6 @@ class Supersigma:
         """It has none."""
         return pins.DEFAULT_STRAPS
 
-    @property
-    def axes(self) -> Sequence[str]:
-        """One axis, without a name."""
-        return ("",)
-
     def status(self, now: Ns, axis: str = "") -> Status:
         """Half steps from the origin (or from where it was switched on), pulses given since made, and one word.
 
@@ -214,38 +185,10 @@ class Supersigma:
         flags = [flag.word for flag in link.FLAGS if self._flags & flag.bit]
         return {"steps": str(self._motion.steps_done(now)), "flags": ", ".join(flags) or "none"}
 
-    def program_memory(self) -> bytes:
-        """It holds no program."""
-        return b""
-
-    def kept_memory(self) -> bytes:
-        """It keeps nothing."""
-        return b""
-
-    def restore(self, image: bytes) -> None:
-        """There is nothing that could keep an image. Raises ImageError."""
-        self._no_memory()
-
-    def load(self, image: bytes, base: int, now: Ns) -> None:
-        """There is no memory for programs. Raises ImageError."""
-        self._no_memory()
-
-    def start(self, now: Ns) -> None:
-        """There is no program to start."""
-        self.advance(now)
-
     def halt(self, now: Ns) -> None:
         """The pulses stop without braking."""
         self.advance(now)
         self._motion.halt(now)
-
-    def displace(self, by: int, now: Ns, axis: str = "") -> None:
-        """The shaft is elsewhere."""
-        self.advance(now)
-        self._axis.displace(by)
-
-    def _no_memory(self) -> NoReturn:
-        raise ImageError("a supersigma drive holds no programs: its table is the option `table`")
 
     # -- messages ----------------------------------------------------------------------------------------
 

@@ -124,11 +124,6 @@ class Motion:
             return [Stop(pins.RAIL, LOW)]
         return [Stop(pins.RAIL, HIGH)] if self.course is Course.FROM_SWITCH else []
 
-    def cut(self, now: Ns) -> None:
-        """The supply fails."""
-        if self._axis.moving:
-            self._axis.cut(now)
-
     def halt(self, now: Ns) -> None:
         """Stop at once, wherever it is."""
         if self._axis.moving:
