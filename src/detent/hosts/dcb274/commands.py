@@ -9,11 +9,11 @@ ask for anything.
 from typing import Final
 
 from detent.hosts.dcb274.answers import Inputs, JogInputs, Ports, Settings
-from detent.hosts.dcb274.handshake import Deaf, SingleMode
+from detent.hosts.dcb274.handshake import SingleMode
 from detent.hosts.dcb274.ranges import LARGEST_ADDRESS, MOST_STEPS, between, place, program_address, sign, speed
-from detent.hosts.dcb274.unit import CLEARING, QUICK, SAVING, Unit
+from detent.hosts.dcb274.unit import CLEARING, SAVING, Unit
 from detent.hosts.errors import BadAnswer
-from detent.hosts.exchange import Ask, Rest, Steps, operation
+from detent.hosts.exchange import Ask, Rest, Steps, attempt, operation
 
 CELLS_AT_ONCE: Final = 32  # bytes of one [: the answer fits into the buffer of a SIN-10
 READ_BACK: Final = 128  # the flag of l that reads, and with 1 of A
@@ -323,17 +323,31 @@ class Commands(Unit):
         """Whatever waits for its turn is dropped, and `letter` is said: as a line, or to a program that runs."""
         self._stops += 1
         self._leave(None)
+        if isinstance(self._way, SingleMode):
+            yield from self._stop_alone(self._way)
+            return
         if not self._connected:
             yield from self.connect()
-        if not self._way.running and self.mode == "single":
-            try:
-                yield from self._enter(letter, QUICK, 1)
-                return
-            except Deaf:
-                # A program runs that this driver did not start, or the character was lost. In single mode it may
-                # have been the interrupt already, and another does no harm.
-                self._way.running = True
+        if self._storing:
+            yield from self._leave_program_mode()
         yield from self._way.interrupt(letter.encode())
+
+    def _stop_alone(self, way: SingleMode) -> Steps[None]:
+        if not self._connected and not self._broken:
+            yield from attempt(self.connect())
+        known = self._connected and not self._storing
+        try:
+            yield from way.soft_stop(known=known)
+        except GeneratorExit:
+            self._connected, self._broken = False, True
+            raise
+        way.running = self._storing = False
+
+    def _leave_program_mode(self) -> Steps[None]:
+        """Where lines are stored nothing is told about the motion; P ends that (page 47)."""
+        if not (yield from self._line("^")).strip():
+            yield from self._line("P", SAVING)
+        self._storing = False
 
     @operation
     def abort(self) -> Steps[None]:

@@ -10,7 +10,7 @@ import re
 from typing import Final
 
 from detent.hosts.errors import ECHOES, BadAnswer, NoAnswer, Refused, Spoken
-from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps, length, until
+from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps, attempt, length, until
 
 BS, LF, CR, SPACE, ESC = b"\x08", b"\n", b"\r", b" ", b"\x1b"
 CTRL_C, CTRL_N, CTRL_P = b"\x03", b"\x0e", b"\x10"
@@ -21,6 +21,8 @@ NOT_NAMES: Final = "[\\]^_`@"  # and ^C, CR, LF (page 23)
 ADAPTERS_OWN: Final = ";&*"  # mean something to a SIN-10: no names behind one
 SPOIL: Final = b"`" * (NAMED_LONGEST + 1)  # no name, no command, and longer than a line may be
 TRIES: Final = 3  # to enter a line
+STOP_TRIES: Final = 20  # to give the stop command: a unit that ramps down out of a program takes no line meanwhile
+STORED: Final = 0.5  # seconds in which the end of a program is written
 RESTART: Final = 0.1  # seconds that a unit may take from ^C or ^P until it listens
 SCAN: Final = 10.0  # seconds for `&`: 86 names, each with a time-out of the adapter's own
 
@@ -182,6 +184,49 @@ class SingleMode(Handshake):
         else:
             self._print(answer.data)
 
+    def soft_stop(self, *, known: bool) -> Steps[None]:
+        """``@`` until the unit has taken it and takes lines again. Raises NoAnswer, BadAnswer.
+
+        ``@`` is not echoed and acts at once where a program runs, a command waits, or a hand jogs (pages 28 and 33); it
+        is echoed, and is a line of its own, where lines are taken. `known`: the line is empty, and no program mode is
+        on. Otherwise an ``@`` that is echoed stands behind something: it is taken back with all of that, and it is seen
+        whether lines are stored. SPACE would not do: a unit with a command that waits does not answer it.
+        """
+        heard, wrong, late = b"", 0, 0.0
+        for _ in range(STOP_TRIES):
+            yield Clear()
+            answer = yield Ask(b"@", until(b"@"), self.patience)
+            late = late or answer.at + STOP_TRIES * self.patience
+            if answer.at > late:
+                break
+            if not answer.whole:
+                self._print(answer.data.replace(b"#\r\n", b""))
+                continue
+            if not known:
+                yield from self._erase(SINGLE_LONGEST + 1)
+                yield from self._end_program_mode()
+                yield Clear()
+                answer = yield Ask(b"@", length(1), self.patience)
+                if answer.data != b"@":
+                    wrong += 1
+                    continue
+            answer = yield Ask(CR, until(b"\r\n"), self.patience)
+            if answer.data == b"\r\n":
+                return
+            if answer.data == CR:  # which no unit echoes
+                raise BadAnswer(self.title, ECHOES, Spoken(b"@\r", b"@\r"))
+            heard, known, wrong = answer.data, False, wrong + 1
+            if wrong >= TRIES:
+                raise BadAnswer(self.title, "answers its stop command with something else", Spoken(b"@\r", heard))
+        what = "does not take its stop command: it is off, or the line is broken"
+        raise NoAnswer(self.title, what, Spoken(b"@", heard), "abort() sends ESC")
+
+    def _end_program_mode(self) -> Steps[None]:
+        """P, if X is refused: lines are stored then (page 47). An empty line is taken."""
+        told = yield from attempt(self._among_reports("X"))
+        if told == "#":
+            yield from attempt(self.line("P", STORED))
+
     def over(self) -> Steps[bool]:
         """X is in no line that a program prints, so its echo is found among them; without one a program runs."""
         answer = yield Ask(b"X", until(b"X"), self.patience)
@@ -224,9 +269,9 @@ class SingleMode(Handshake):
             raise NoAnswer(self.title, f"{what} within {self.patience:g} s", spoken)
         return answer.data[:-2].decode("latin-1")
 
-    def _erase(self) -> Steps[None]:
+    def _erase(self, most: int = 2 * SINGLE_LONGEST) -> Steps[None]:
         """Take back what stands in the line: BS is echoed as long as there is something (page 22)."""
-        for _ in range(2 * SINGLE_LONGEST):
+        for _ in range(most):
             answer = yield Ask(BS, until(BS), self.patience)
             if not answer.whole:
                 return

@@ -137,6 +137,7 @@ class Memory(Commands):
     def _store(self, block: Block, done: int, total: int) -> Steps[list[Listed]]:
         stored: list[Listed] = []
         address = block.address
+        self._storing = True
         yield from self._line(f"P{address}")
         try:
             for text in block.texts:
@@ -147,9 +148,11 @@ class Memory(Commands):
         except Refused as error:
             # ESC would leave the rest of an older program behind the new instructions, and stop every axis.
             yield from self._line("P", _STORING)
+            self._storing = False
             what = f"{error.what}; new instructions stand at {block.address} to {address - 1}, an end mark at {address}"
             raise Refused(self.title, what, error.spoken, error.code) from None
         yield from self._line("P", _STORING)
+        self._storing = False
         return stored
 
     def _verify(self, block: Block) -> Steps[None]:

@@ -60,6 +60,8 @@ class Unit(Axis):
         self.programming = False  # a line of ours has begun program mode: lines are stored
         self.left_over = ""  # where the last look at all programs found what is left of older ones, like "7-20, 300"
         self._connected = False
+        self._broken = False  # an operation was broken off: something may stand in the line, or be under way
+        self._storing = False  # lines were being stored, and the end of that was not seen
         self._stops = 0  # how often the axis was stopped
         self._times_told = 0  # how often it was told to do something else
         self._target: int | None = None  # where the index under way should end, if that is known
@@ -82,8 +84,9 @@ class Unit(Axis):
         version if the unit tells. A SIN-10 that does not know the axis yet resets all axes to look for them (page 19).
         """
         self.version = (yield from self._way.connect()) or self.version
-        self._connected = True
+        self._connected, self._broken = True, False
         if isinstance(self._way, SingleMode):
+            self._storing = False  # X was answered
             self.name = self._settings(self._way.examined).name
             self.title = self._way.title = f"DCB-274 {self.name}"
         return self.version
@@ -128,7 +131,7 @@ class Unit(Axis):
             self._connected = isinstance(error, Deaf)
             raise
         except GeneratorExit:  # the caller was cancelled
-            self._connected = False
+            self._connected, self._broken = False, True
             raise
 
     def _see_it_over(self) -> Steps[None]:

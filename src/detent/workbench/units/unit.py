@@ -9,6 +9,7 @@ from detent.controllers import catalogue
 from detent.controllers.gsc200.pins import select
 from detent.controllers.phrase import Phrases
 from detent.hosts.axis import Axis
+from detent.hosts.dcb274 import Dcb274
 from detent.hosts.errors import DriverError
 from detent.hosts.exchange import Asynchronous, Progress, Steps
 from detent.hosts.typed import Said, say
@@ -29,6 +30,7 @@ RATES: Final = (0.2, 0.5, 1.0, 2.0, 5.0)  # looks a second that one may choose
 RATE: Final = 1.0
 SLOWEST: Final = 8.0  # seconds between two looks at a unit that does not answer
 RAMP_SECONDS: Final = 2.0  # that a unit has to take its stop command, before it is stopped at once
+DEAF_SECONDS: Final = 7.0  # the same for a DCB-274, which takes no line while it ramps down out of a program
 HALT_SECONDS: Final = 5.0  # and for that one
 LOOK_SECONDS: Final = 0.3  # that a look under way may still take when a stop comes: one takes 0.1 s at 9600 baud
 HOLD_SECONDS: Final = 1.0  # a key is let go if its window has not said for so long that it is held
@@ -236,7 +238,8 @@ class Unit:
         driver = self.shell.driver
         assert isinstance(driver, Axis)
         why = ""
-        ways = ((driver.stop, RAMP_SECONDS, "stops by its ramp"), (driver.halt, HALT_SECONDS, "stopped at once"))
+        patience = DEAF_SECONDS if isinstance(driver, Dcb274) else RAMP_SECONDS
+        ways = ((driver.stop, patience, "stops by its ramp"), (driver.halt, HALT_SECONDS, "stopped at once"))
         for way, seconds, words in ways[at_once:]:
             try:
                 await asyncio.wait_for(self.shell.perform(way()), seconds)

@@ -1,0 +1,120 @@
+"""A stop breaks off whatever a driver of a DCB-274 is at, between any two steps and within each: the axis ramps down.
+
+ESC would stop it too, but at once and without a ramp (page 33), and every other axis of a party line with it.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from detent.cell.build import build
+from detent.cell.cell import Cell
+from detent.cell.description import parse
+from detent.cell.host import HostPort
+from detent.hosts.dcb274 import BlockingDcb274, Dcb274
+from detent.hosts.errors import DriverError, NoAnswer
+from detent.hosts.exchange import Ask, Steps
+
+ESC = b"\x1b"
+REST = 8.0  # seconds: every ramp here is over by then
+
+DOES: dict[str, Callable[[Dcb274], Steps[Any]]] = {
+    "a setting": lambda axis: axis.command("V 900"),
+    "an index that waits": lambda axis: axis.command("+ 5000", 1000),
+    "a wait": lambda axis: axis.command("W 0", 1000),
+    "a look at the position": lambda axis: axis.position(),
+    "a look at the motion": lambda axis: axis.moving_status(),
+    "a move": lambda axis: axis.move_by(5000),
+    "a run": lambda axis: axis.run_at(-900),
+    "storing a program": lambda axis: axis.write_program(["+ 2000", "W 0"]),
+}
+
+
+def in_program(unit: Any) -> None:
+    unit.write_program(["+ 60000", "W 0"])
+    unit.go()
+
+
+MOVES: dict[str, Callable[[Any], object]] = {
+    "rests": lambda unit: None,
+    "runs": lambda unit: unit.run_at(2000),
+    "indexes": lambda unit: unit.move_by(60000),
+    "runs a program": in_program,
+}
+
+
+class Told(HostPort):
+    """A port that remembers what was sent."""
+
+    def __init__(self, cell: Cell) -> None:
+        super().__init__(cell)
+        self.sent = b""
+
+    def write(self, data: bytes) -> int:
+        self.sent += data
+        return super().write(data)
+
+
+def begun(moves: str, way: str = "") -> tuple[Cell, Told, Any]:
+    strap = 'straps = { PARTY = "high" }\n[units.unit.options]\nname = "X"\n' if way else ""
+    cell = build(parse(f'[units.unit]\nmodel = "dcb-274"\n{strap}', "cell"), lambda file: "", record=True)
+    port = Told(cell)
+    unit = BlockingDcb274(Dcb274("X", mode=way) if way else Dcb274(), port)
+    unit.connect()
+    MOVES[moves](unit)
+    return cell, port, unit
+
+
+def broken_off(unit: Any, port: Told, steps: Steps[Any], behind: int, *, said: bool) -> bool:
+    """Carry out so many steps, hand the next one over if it is to be `said`, and break off; whether all were done."""
+    answer = None
+    try:
+        for _ in range(behind):
+            answer = unit._do(next(steps) if answer is None else steps.send(answer))
+        step = next(steps) if answer is None else steps.send(answer)
+    except (StopIteration, DriverError):
+        return True
+    if said and isinstance(step, Ask):
+        port.write(step.data)
+    steps.close()
+    return False
+
+
+def ramps_down(moves: str, does: str, *, said: bool, later: float, way: str = "") -> None:
+    behind, over = 0, False
+    while not over:
+        cell, port, unit = begun(moves, way)
+        over = broken_off(unit, port, DOES[does](unit.driver), behind, said=said)
+        port.wait(later)
+        before = len(port.sent)
+        unit.stop()
+        what = f"{moves}, {does}, broken off behind {behind} steps (said: {said}), stopped {later} s later"
+        assert ESC not in port.sent[before:], what
+        port.wait(REST)
+        assert cell.controllers()["unit"].status(cell.now, "").state == "ready", what
+        behind += 1
+
+
+@pytest.mark.parametrize("does", DOES)
+@pytest.mark.parametrize("moves", MOVES)
+def test_a_stop_that_breaks_something_off_ramps_down(moves: str, does: str) -> None:
+    for said in (False, True):
+        ramps_down(moves, does, said=said, later=0.003)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("later", [0.0, 0.001, 0.01, 0.05, 0.4])
+@pytest.mark.parametrize("does", DOES)
+@pytest.mark.parametrize("moves", MOVES)
+def test_a_stop_at_any_time_after_that_too(moves: str, does: str, later: float) -> None:
+    for said in (False, True):
+        ramps_down(moves, does, said=said, later=later)
+
+
+@pytest.mark.parametrize("moves", ["rests", "runs"])
+def test_a_stop_that_nobody_hears_is_an_error(moves: str) -> None:
+    cell, _, unit = begun(moves)
+    cell.power("unit", False)
+    with pytest.raises(NoAnswer, match="does not take its stop command"):
+        unit.stop()
