@@ -3,6 +3,7 @@
 #   make test      every check that a change must pass (a few minutes)
 #   make test-all  the slow tests too
 #   make bench     the benchmarks, each with its baseline measured in the same run
+#   make fuzz      units, cells and everything that reads under 10^7 generated frames, an hour at most
 
 SHELL := /bin/bash
 UV := $(shell command -v uv || echo .uv/bin/uv)
@@ -11,7 +12,7 @@ STAMP := .venv/.installed
 SYSTEM_PACKAGES := sigrok-cli chromium npm
 AXE := axe-core@4.14.1
 
-.PHONY: setup system axe run test test-all check bench lock docs clean
+.PHONY: setup system axe run test test-all check bench fuzz lock docs clean
 
 setup: $(STAMP)
 
@@ -32,6 +33,10 @@ check: $(STAMP)
 
 bench: $(STAMP)
 	$(PYTHON) -m bench
+
+# Their short forms are among the slow tests.
+fuzz: $(STAMP)
+	$(PYTHON) -m tests.proofs fuzz
 
 # What the reference pages take from the tables, and the pages as a site.
 docs: $(STAMP)

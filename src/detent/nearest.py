@@ -9,6 +9,7 @@ from difflib import SequenceMatcher
 from typing import Final
 
 CUTOFF: Final = 0.5  # how much of two names must agree, from 0 to 1
+LONGEST: Final = 100  # characters: what is longer was never meant to be a name
 _LIKE = 1e-9  # as near as another
 _OTHER = {"+": "-", "-": "+"}
 
@@ -20,6 +21,8 @@ def nearest(name: str, known: Iterable[str], cutoff: float = CUTOFF) -> list[str
     other sign as well.
     """
     names = list(dict.fromkeys(known))
+    if len(name) > LONGEST:
+        return []
     if same := [found for found in names if found.lower() == name.lower()]:
         return same
     found: list[str] = []

@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+from detent.one_line import one_line
+
 if TYPE_CHECKING:
     from typing import Annotated
 
@@ -28,8 +30,8 @@ class Problem(ValueError):
     """Something wrong with a cell, a program or a choice. `str` is one line: file, key, what, remedy."""
 
     def __init__(self, file: str, key: str, message: str) -> None:
-        super().__init__(": ".join(part for part in (file, key, message) if part))
-        self.file, self.key, self.message = file, key, message
+        self.file, self.key, self.message = file, one_line(key), one_line(message)
+        super().__init__(": ".join(part for part in (file, self.key, self.message) if part))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,9 +11,14 @@ from dataclasses import dataclass, field, replace
 from math import inf, isfinite, pi, sqrt
 from typing import Any
 
+from detent.one_line import one_line
+
 
 class MotorError(ValueError):
     """Data that no motor, drive or load can have, or that do not go together; the text has the remedy."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(one_line(text))
 
 
 class Shared:

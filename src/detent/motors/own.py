@@ -22,7 +22,7 @@ step = "half"
 
 import tomllib
 from collections.abc import Sequence
-from math import isfinite, pi
+from math import inf, isfinite, pi
 from typing import Any, NamedTuple
 
 from detent.motors.drive import Drive
@@ -86,9 +86,15 @@ def _value(file: str, key: str, value: object) -> object:
         if not isinstance(value, str) or len(value) > 200:
             raise MotorError(f"{file}: {key}: give a word, not {value!r}")
         return value
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float):
         raise MotorError(f"{file}: {key}: give a number, not {value!r}")
-    return float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = inf
+    if not isfinite(number):
+        raise MotorError(f"{file}: {key}: give a number, not {value!r}")
+    return number
 
 
 def _check_keys(file: str, where: str, data: dict[str, Any], known: Sequence[str]) -> None:
@@ -108,7 +114,10 @@ def _curve(file: str, data: object, motor: Motor) -> Curve:
     current = float(_value(file, "current", data.get("current", motor.current)))  # type: ignore[arg-type]
     per_step = winding(step).steps
     points = []
-    for point in data.get("points", ()):
+    listed = data.get("points", [])
+    if not isinstance(listed, list) or len(listed) > MOST_POINTS:
+        raise MotorError(f"curve.points: give a list of at most {MOST_POINTS} points [{step} steps/s, Nm]")
+    for point in listed:
         if not isinstance(point, list) or len(point) != 2:
             raise MotorError(f"curve.points: a point is [{step} steps/s, Nm], not {point!r}")
         rate, torque = (float(_value(file, "curve.points", value)) for value in point)  # type: ignore[arg-type]

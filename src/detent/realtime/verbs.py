@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple, TypeAlias
 
 from detent.nearest import did_you_mean
+from detent.one_line import one_line
 from detent.ticks import SECOND, parse_duration
 
 SHORT_WAIT: Final = 60.0  # seconds of the wall clock that what waits waits, unless it is said otherwise
@@ -22,8 +23,8 @@ class AskedWrongly(ValueError):
     """A request that makes no sense: what is wrong and, in `remedy`, what to do."""
 
     def __init__(self, what: str, remedy: str = "") -> None:
-        super().__init__(f"{what}; {remedy}" if remedy else what)
-        self.what, self.remedy = what, remedy
+        self.what, self.remedy = one_line(what), one_line(remedy)
+        super().__init__(f"{self.what}; {self.remedy}" if remedy else self.what)
 
     @classmethod
     def of(cls, error: Exception) -> "AskedWrongly":

@@ -11,12 +11,16 @@ from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from typing import Any, NamedTuple, TypeAlias
 
+from detent.one_line import one_line
 from detent.realtime.boards.frames import FrameError, integer, read_integer
 
 Value: TypeAlias = int | bytes
 
 _FIELD = re.compile(r"(\w+)=%(\S+)")
 _RESERVED = "RESERVE_PINS_"
+_NUMBERS = ("CLOCK_FREQ", "RECEIVE_WINDOW")  # constants that are counted with
+LARGEST = 4 << 20  # bytes of a dictionary that is unpacked
+MOST_NAMES = 100_000  # in its enumerations
 
 
 class Message(NamedTuple):
@@ -97,11 +101,15 @@ class Dictionary:
     def of_bytes(cls, data: bytes) -> "Dictionary":
         """Of what `identify` gave. ValueError if it is no dictionary."""
         try:
-            content = json.loads(zlib.decompress(data))
+            unpacked = zlib.decompressobj().decompress(data, LARGEST)
+            content = json.loads(unpacked)
         except (zlib.error, ValueError) as error:
-            raise ValueError(f"this is no dictionary of a firmware: {error}") from None
+            raise ValueError(one_line(f"this is no dictionary of a firmware: {error}")) from None
+        except RecursionError:
+            raise ValueError("this is no dictionary of a firmware: it is nested too deeply") from None
         if not isinstance(content, dict) or "commands" not in content:
             raise ValueError("this is no dictionary of a firmware: it names no commands")
+        _check(content)
         return cls(content)
 
     @property
@@ -177,6 +185,37 @@ class Dictionary:
             elif {field for field, _ in form.fields} != set(fields):
                 absent.append(f"{name} with {', '.join(fields)}")
         return absent
+
+
+def _check(content: Mapping[str, Any]) -> None:
+    """Raise ValueError for what a board has said wrongly of itself."""
+
+    def wrong(what: str) -> ValueError:
+        return ValueError(one_line(f"this is no dictionary of a firmware: {what}"))
+
+    for name in ("commands", "responses", "config", "enumerations"):
+        if not isinstance(content.get(name, {}), dict):
+            raise wrong(f"{name} is no table")
+    for name in ("commands", "responses"):
+        for text, number in content.get(name, {}).items():
+            if not text.strip() or type(number) is not int or not -(2**31) <= number < 2**32:
+                raise wrong(f"{name}: {text!r} has the number {number!r}")
+    for name in _NUMBERS:
+        value = content.get("config", {}).get(name, 0)
+        if type(value) not in (int, float) or not 0 <= value < 2**32:
+            raise wrong(f"{name} is {value!r}")
+    count = 0
+    for name, entries in content.get("enumerations", {}).items():
+        if not isinstance(entries, dict):
+            raise wrong(f"{name} is no table")
+        for entry, value in entries.items():
+            numbers = value if isinstance(value, list) and len(value) == 2 else [value, 1]
+            if any(type(one) is not int or not 0 <= one < 2**32 for one in numbers):
+                raise wrong(f"{name} {entry!r} has the numbers {value!r}")
+            count += numbers[1]
+            figures = entry[len(entry.rstrip("0123456789")) :]
+            if count > MOST_NAMES or len(figures) > 9:
+                raise wrong(f"{name} {entry!r} and so on are too many names")
 
 
 def _spread(entries: Mapping[str, Any]) -> dict[str, int]:

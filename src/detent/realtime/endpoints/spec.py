@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
+from detent.one_line import one_line
 from detent.realtime.endpoints.endpoint import Endpoint, EndpointError
 from detent.realtime.endpoints.opened import Openings
 from detent.realtime.endpoints.rfc2217 import Rfc2217Port
@@ -31,7 +32,8 @@ class EndpointSpec(NamedTuple):
         kind, _, where = text.partition(":")
         if kind not in ("pty", *_LISTENING, "serial") or (kind != "pty" and not where):
             raise ValueError(
-                f"{text!r} is no endpoint; write pty, pty:LINK, tcp:HOST:PORT, rfc2217:HOST:PORT or serial:DEVICE"
+                f"{one_line(repr(text), 100)} is no endpoint; "
+                "write pty, pty:LINK, tcp:HOST:PORT, rfc2217:HOST:PORT or serial:DEVICE"
             )
         return cls(kind, where).checked()
 

@@ -6,6 +6,7 @@ import socket
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from detent.one_line import one_line
 from detent.realtime.endpoints.endpoint import MOST_READ, OUT_OF_DESCRIPTORS, EndpointError, Outgoing
 from detent.realtime.pace import WallNs
 from detent.realtime.system import reuse_address
@@ -29,8 +30,10 @@ class TcpAddress(NamedTuple):
         """Read HOST:PORT; an IPv6 host stands in brackets, no host is this computer. Raises ValueError."""
         host, colon, port = text.rpartition(":")
         bracketed = host.startswith("[") and host.endswith("]")
-        if not colon or not (port.isascii() and port.isdigit()) or int(port) > 65535 or (":" in host and not bracketed):
-            raise ValueError(f"{text!r} is no HOST:PORT; write 127.0.0.1:4001, [::1]:4001, or port 0 for any free one")
+        figures = port.isascii() and port.isdigit() and len(port) <= 5
+        if not colon or not figures or int(port) > 65535 or (":" in host and not bracketed) or len(host) > 255:
+            told = one_line(repr(text), 100)
+            raise ValueError(f"{told} is no HOST:PORT; write 127.0.0.1:4001, [::1]:4001, or port 0 for any free one")
         return cls(host[1:-1] if bracketed else host or "127.0.0.1", int(port))
 
     def __str__(self) -> str:

@@ -1,0 +1,48 @@
+"""The short form of ``make fuzz``, and every case that once failed."""
+
+from pathlib import Path
+
+import pytest
+from tests.proofs import fuzz
+
+FAILED = sorted(fuzz.CASES.glob("*.json"))
+
+
+@pytest.mark.parametrize("path", FAILED, ids=lambda path: path.stem)
+def test_what_once_failed_holds(path: Path) -> None:
+    fuzz.replay(path)
+
+
+@pytest.mark.parametrize("target", fuzz.targets())
+def test_a_few_cases_of_every_target_hold(target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuzz, "CASES", tmp_path)
+    tally = fuzz.batch(target, 0, {"unit": 12, "cell": 4, "read": 60}[target.partition(" ")[0]])
+    assert tally.cases
+    assert not [path.read_text() for path in tmp_path.iterdir()]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("target", fuzz.targets())
+def test_many_cases_of_every_target_hold(target: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuzz, "CASES", tmp_path)
+    tally = fuzz.batch(target, 1000, {"unit": 300, "cell": 60, "read": 4000}[target.partition(" ")[0]])
+    assert tally.cases
+    assert not [path.read_text() for path in tmp_path.iterdir()]
+
+
+def test_a_case_that_fails_is_made_small_and_fails_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A unit that breaks at a frame: what is kept is that frame."""
+    monkeypatch.setattr(fuzz, "CASES", tmp_path)
+    check = fuzz.units.check
+
+    def breaks(case: fuzz.units.Case, tally: fuzz.Tally) -> None:
+        check(case, tally)
+        if any(getattr(deed, "text", "").startswith("S") for deed in case.deeds):
+            raise ZeroDivisionError("S breaks it")
+
+    monkeypatch.setattr(fuzz.units, "check", breaks)
+    tally = fuzz.batch("unit gs-c200", 0, 1)
+    (name,) = tally.failures
+    assert (tmp_path / name).read_text().count('"Say"') == 1
+    with pytest.raises(ZeroDivisionError):
+        fuzz.replay(tmp_path / name)
