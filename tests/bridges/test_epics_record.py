@@ -12,7 +12,8 @@ import pytest
 
 from detent.bridges.epics.cells import axes
 from detent.bridges.epics.fields import COMMUNICATION, FAILED, NO_ALARM, STOPPED, Alarm, Doing, Go, Settings, Status
-from detent.bridges.epics.record import MotorRecord, PutFailed
+from detent.bridges.epics.motor import PutFailed
+from detent.bridges.epics.record import MotorRecord
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import parse

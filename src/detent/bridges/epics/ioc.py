@@ -25,7 +25,8 @@ from caproto import (
 from caproto.server import PVGroup, pvproperty
 
 from detent.bridges.epics.fields import Alarm, Settings, Value
-from detent.bridges.epics.record import Motor, MotorRecord, PutFailed
+from detent.bridges.epics.motor import Motor, PutFailed
+from detent.bridges.epics.record import MotorRecord
 from detent.bridges.epics.server import Context, quietly
 
 _LIMITS = {
