@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.realtime.served import address, served
 
-from detent.cli import VERBS, main
+from detent.cli import VERBS, application, main
 from detent.realtime.endpoints.spec import EndpointSpec
 
 
@@ -32,6 +32,14 @@ def test_the_line_that_help_shows_is_the_first_of_the_verbs_own_help(name: str) 
 def test_every_verb_has_help_and_offers_json(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert status(name, "--help") == 0
     assert "--json" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_every_parameter_of_a_verb_has_help(name: str) -> None:
+    parameters = application(name)[name].assemble_argument_collection(parse_docstring=True)
+    assert len(parameters)
+    without = [each.names for each in parameters if each.names != ("*",) and not each.parameter.help]
+    assert not without
 
 
 def test_a_wrong_call_exits_with_2_and_names_the_verb_that_was_meant(capsys: pytest.CaptureFixture[str]) -> None:

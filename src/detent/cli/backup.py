@@ -7,7 +7,7 @@ from errno import EILSEQ
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
+from detent.cli.unit import NO_UNIT_OPTIONS, ModelName, PortName, UnitOptions
 
 if TYPE_CHECKING:
     from detent.hosts.backups import Backup
@@ -25,8 +25,8 @@ class Keeper(Protocol):
 
 
 def backup(
-    model: str,
-    port: str,
+    model: ModelName,
+    port: PortName,
     file: Path,
     *,
     force: bool = False,
@@ -40,18 +40,12 @@ def backup(
 
     Parameters
     ----------
-    model
-        The controller: gs-c200, dcb-274, ...
-    port
-        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
     file
         The file to write, FILE.toml.
     force
         Write over a file that is there.
     json
         Print what was saved as JSON, too.
-    unit
-        Which unit is meant, and its line.
     """
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
@@ -70,8 +64,8 @@ def backup(
 
 
 def restore(
-    model: str,
-    port: str,
+    model: ModelName,
+    port: PortName,
     file: Path,
     *,
     yes: bool = False,
@@ -85,18 +79,12 @@ def restore(
 
     Parameters
     ----------
-    model
-        The controller: gs-c200, dcb-274, ...
-    port
-        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
     file
         A file that `detent backup` wrote.
     yes
         Write without asking.
     json
         Print the result as one line of JSON; needs --yes.
-    unit
-        Which unit is meant, and its line.
     """
     from detent.cli.endings import asked_wrongly, failed
     from detent.cli.unit import progress

@@ -3,7 +3,7 @@
 import json as json_text
 from typing import TYPE_CHECKING, NamedTuple
 
-from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
+from detent.cli.unit import NO_UNIT_OPTIONS, ModelName, PortName, UnitOptions
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -22,8 +22,8 @@ QUESTIONS = {
 
 
 def bench(
-    model: str,
-    port: str,
+    model: ModelName,
+    port: PortName,
     *,
     count: int = 200,
     json: bool = False,
@@ -36,16 +36,10 @@ def bench(
 
     Parameters
     ----------
-    model
-        The controller: gs-c200, dcb-274, ...
-    port
-        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
     count
         How many times it is asked.
     json
         Print the result as one line of JSON, times in seconds.
-    unit
-        Which unit is meant, and its line.
     """
     from time import perf_counter
 

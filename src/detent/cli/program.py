@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from detent.assembler import Assembly, AssemblyFailed, Language, assemble
 from detent.cli import ASKED_WRONGLY, FAILED
-from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
+from detent.cli.unit import NO_UNIT_OPTIONS, ModelName, PortName, UnitOptions
 
 if TYPE_CHECKING:
     from detent.hosts.exchange import Blocking
@@ -33,8 +33,8 @@ class Programmed(Protocol):
 
 
 def upload(
-    model: str,
-    port: str,
+    model: ModelName,
+    port: PortName,
     file: Path,
     *,
     save: Annotated[bool, Parameter(negative=())] = False,
@@ -48,18 +48,12 @@ def upload(
 
     Parameters
     ----------
-    model
-        The controller: gs-c200, dcb-274, ...
-    port
-        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
     file
         The source, one command a line.
     save
         Keep it over a power-off, too: M of a GS-C200, S of a DCB-274 for what stands at 128 to 191.
     json
         Print the result as one line of JSON.
-    unit
-        Which unit is meant, and its line.
     """
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected
@@ -81,8 +75,8 @@ def upload(
 
 
 def download(
-    model: str,
-    port: str,
+    model: ModelName,
+    port: PortName,
     file: Path | None = None,
     *,
     output: Path | None = None,
@@ -94,10 +88,6 @@ def download(
 
     Parameters
     ----------
-    model
-        The controller: gs-c200, dcb-274, ...
-    port
-        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
     file
         A file to write instead of the terminal, whole or not at all.
     output
@@ -106,8 +96,6 @@ def download(
         Write over a file that is there.
     json
         Print source and lines as one line of JSON.
-    unit
-        Which unit is meant, and its line.
     """
     from detent.cli.endings import asked_wrongly, failed
     from detent.cli.unit import progress
@@ -146,8 +134,8 @@ def download(
 
 
 def compare(
-    model: str,
-    port: str,
+    model: ModelName,
+    port: PortName,
     file: Path,
     *,
     json: bool = False,
@@ -160,16 +148,10 @@ def compare(
 
     Parameters
     ----------
-    model
-        The controller: gs-c200, dcb-274, ...
-    port
-        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
     file
         The source.
     json
         Print the result as one line of JSON.
-    unit
-        Which unit is meant, and its line.
     """
     from detent.cli.unit import progress
     from detent.cli.unit import unit as connected

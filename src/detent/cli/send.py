@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from detent.cli import FAILED
-from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
+from detent.cli.unit import NO_UNIT_OPTIONS, ModelName, PortName, UnitOptions
 
 if TYPE_CHECKING:
     from detent.hosts.typed import Said
@@ -15,8 +15,8 @@ LONGEST_WAIT = 86_400.0  # seconds
 
 
 def send(
-    model: str,
-    port: str,
+    model: ModelName,
+    port: PortName,
     *lines: str,
     raw: bool = False,
     wait: float | None = None,
@@ -32,10 +32,6 @@ def send(
 
     Parameters
     ----------
-    model
-        The controller: gs-c200, dcb-274, ...
-    port
-        A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.
     lines
         Command lines as the manual writes them.
     raw
@@ -45,8 +41,6 @@ def send(
         line has started, unless it ends before (60). With --raw: in which answers are collected (0.5).
     json
         Print one line of JSON.
-    unit
-        Which unit is meant, and its line.
     """
     from detent.cli.endings import asked_wrongly
     from detent.cli.unit import unit as connected

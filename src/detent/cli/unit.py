@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from cyclopts import Parameter
 
@@ -92,6 +92,12 @@ class UnitOptions:
 
 
 NO_UNIT_OPTIONS = UnitOptions()
+
+# what every verb that talks to a unit takes
+ModelName: TypeAlias = Annotated[str, Parameter(help="The controller: gs-c200, dcb-274, ...")]
+PortName: TypeAlias = Annotated[
+    str, Parameter(help="A serial device or a link to one, HOST:PORT, or rfc2217://HOST:PORT.")
+]
 
 
 def flag(option: str, value: object = None) -> str:
