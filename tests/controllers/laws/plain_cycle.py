@@ -57,13 +57,26 @@ class Smc:
     not again before it has returned.
     """
 
-    LENGTHS: Mapping[str, int] = {"+": 4, "-": 4, "W": 3, "A": 2, "T": 5, "L": 4, "J": 4, "K": 3, "I": 3}
+    LENGTHS: Mapping[str, int] = {
+        "+": 4,
+        "-": 4,
+        "W": 3,
+        "A": 2,
+        "T": 5,
+        "L": 4,
+        "J": 4,
+        "K": 3,
+        "I": 3,
+        "k": 5,
+        "i": 5,
+    }
     TIMES: Mapping[str, Ns] = {"+": 7500 * US, "-": 7500 * US, "L": 2500 * US, "I": 3500 * US}
     OTHERS: Ns = 500 * US
 
     def __init__(self, lines: Mapping[int, Line], steps: Steps, port: Input, until: Ns) -> None:
         self.lines, self.steps, self.port, self.until = lines, steps, port, until
         self.reached: list[tuple[Ns, int]] = []
+        self.done: list[tuple[Ns, Line]] = []  # when the time of each was over
         self._trip: int | None = None
         self._vector = 0
         self._looked: Ns = 0
@@ -105,6 +118,7 @@ class Smc:
     def _do(self, line: Line, now: Ns) -> tuple[Ns, int, bool]:
         """What an instruction does when its time is over; the time, the next address, whether that is in hand."""
         behind = line.address + self.LENGTHS[line.letter]
+        self.done.append((now, line))
         match line.letter:
             case "W":
                 now = self._wait(now, self.steps.rest(now))
@@ -177,10 +191,41 @@ class Smc:
         return now
 
 
-class Simple:
-    """The program of a GS-C200 (datasheet, commands A to W): each instruction takes its time and a millisecond."""
+def outputs(done: Sequence[tuple[Ns, Line]], chain: Mapping[int, Line], steps: Steps) -> list[tuple[Ns, int]]:
+    """What a DCB-274 writes to its ports: by A, k and i that were executed, and by what stands at 128 (pages 42, 43).
 
-    LENGTHS: Mapping[str, int] = {"+": 4, "-": 4, "A": 2, "C": 2, "D": 2, "L": 2, "U": 2, "W": 2}
+    "k 200 8": the ports now, a trip at 200, and the special program counter at 128. When the position matches, the
+    command there is carried out at that very step if it is a k, which advances the counter by its 5 bytes, or an i,
+    which makes the position zero and begins at 128 again; anything else ends it.
+    """
+    written: list[tuple[Ns, int]] = []
+    origin, trip, counter = 0, None, 128
+    begun = [(at, 1, line, 0) for at, line in done if line.letter in "Aki"]
+    made = [(at, 0, None, place) for at, place in zip(steps.times, steps.places, strict=True)]
+    place = 0
+    for at, _, line, there in sorted(begun + made, key=lambda event: event[:2]):
+        if line is None:
+            place = there
+            if trip is None or place - origin != trip:
+                continue
+            line, counter = chain.get(counter), counter + 5
+            if line is None or line.letter not in "ki":
+                trip = None
+                continue
+        elif line.letter in "ki":
+            counter = 128
+        written.append((at, line.numbers[-1]))
+        if line.letter == "i":
+            origin, counter = place, 128
+        if line.letter in "ki":
+            trip = line.numbers[0]
+    return written
+
+
+class Simple:
+    """The program of a GS-C200 (datasheet, commands A to jc): each instruction takes its time and a millisecond."""
+
+    LENGTHS: Mapping[str, int] = {"+": 4, "-": 4, "A": 2, "C": 2, "D": 2, "L": 2, "U": 2, "W": 2, "j": 2, "jc": 2}
 
     def __init__(self, lines: Mapping[int, Line], steps: Steps, inputs: Mapping[int, Input], until: Ns) -> None:
         self.lines, self.steps, self.inputs, self.until = lines, steps, inputs, until
@@ -205,5 +250,10 @@ class Simple:
                     address, rounds = (mark, rounds + 1) if rounds < times else (address, 1)
                 case (("+" | "-"), _):
                     now = self.steps.rest(now)
+                case "j", target:
+                    address = target
+                case "jc", value, target:
+                    weights = sum(self.inputs[pin].at(now) << pin - 1 for pin in (1, 2, 3))
+                    address = target if weights == value else address
             now += 1 * MS
         return [(at, place) for at, place in reached if at <= self.until]

@@ -135,4 +135,4 @@ def test_a_stop_is_for_those_it_is_meant_for(line: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("line", LINES)
 def test_a_stop_is_for_those_it_is_meant_for_in_many_more_cells(line: str) -> None:
-    check(line, THOROUGH // 3)
+    check(line, THOROUGH)

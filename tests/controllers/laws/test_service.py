@@ -13,7 +13,7 @@ from tests.controllers.laws import dcb274, genstepper, gsc200, supersigma
 from tests.controllers.laws.adapter import history, ready
 from tests.controllers.laws.bench import Bench, Put, Say, Wait
 from tests.controllers.laws.histories import ORDINARY, THOROUGH, History, gap, hold
-from tests.controllers.laws.plain_cycle import Input, Line, Simple, Smc, Steps
+from tests.controllers.laws.plain_cycle import Input, Line, Simple, Smc, Steps, outputs
 
 from detent.axis import MotionStarted
 from detent.controllers.device import Executing
@@ -137,6 +137,70 @@ def smc_runs_as_the_manual_says(_: History, program: Program) -> bool:
     return any(address >= 64 for _, address in reached(bench))
 
 
+def special_program(draw: Random) -> Program:
+    """A program that sets special trips, at rest and in motion, and what stands at 128."""
+    address, lines = 0, []
+
+    def add(letter: str, *numbers: int) -> None:
+        nonlocal address
+        lines.append(Line(address, letter, numbers))
+        address += Smc.LENGTHS[letter]
+
+    def place() -> int:
+        nonlocal ahead
+        ahead += draw.choice((0, 1, 2, 17))
+        return draw.choice((ahead, ahead, ahead, draw.randrange(-20, 120)))
+
+    ahead = draw.randrange(30)
+    for n in range(draw.randint(2, 6)):
+        match draw.randrange(7) if n > 1 else 2 * n:
+            case 0 | 1:
+                add(draw.choice("kki"), place(), draw.choice((0, 8, 16, 24)))
+            case 2 | 3 | 4:
+                add(draw.choice("++-"), draw.choice((1, 3, 60, 150, 200)))
+            case 5:
+                add("W", draw.choice((0, 1)))
+            case 6:
+                add("A", draw.choice((0, 8, 16)))
+    address = 128
+    for _ in range(draw.randint(1, 5)):
+        add(draw.choice("kkkkiA"), place(), draw.choice((0, 8, 16, 24)))
+        if lines[-1].letter == "A":
+            lines[-1] = lines[-1]._replace(numbers=lines[-1].numbers[-1:])
+    return Program(tuple(lines), {})
+
+
+def special_trips_act_at_their_very_step(_: History, program: Program) -> bool:
+    """ "There actions are performed in real time" (page 42)."""
+    bench = ready(dcb274.MODELS[0], History({}, (), ()))
+    here = None
+    for line in program.lines:
+        if line.address != here:
+            bench.play(() if here is None else (Say("P"), Wait(5 * MS)))
+            bench.play((Say(f"P {line.address}"), Wait(5 * MS)))
+        bench.play((Say(f"{line.letter} {' '.join(map(str, line.numbers))}"), Wait(8 * MS)))
+        here = line.address + Smc.LENGTHS[line.letter]
+    bench.play((Say("P"), Wait(5 * MS)))
+    bench.out.clear()
+    bench.play((Say("G 0"),))
+    begun = play(bench, program, {}, 2 * SECOND)
+    lines = {line.address: line for line in program.lines}
+    steps = stepped(bench)
+    plain, times = Smc(lines, steps, Input(()), bench.now), set(steps.times)
+    compare(bench, plain.run(begun + Smc.OTHERS), program.lines)
+    expected: list[tuple[Ns, str, int]] = []
+    levels = {"P4": HIGH, "P5": HIGH}
+    for at, data in outputs(plain.done, lines, steps):
+        for pin, bit in (("P4", 8), ("P5", 16)):
+            level = LOW if data & bit else HIGH
+            if levels[pin] != level:
+                levels[pin] = level
+                expected.append((at, pin, level))
+    told = [(item.at, item.pin, item.level) for item in bench.out if isinstance(item, PinSet) and item.pin in levels]
+    assert told == expected, f"{told} is told, and {expected} is due"
+    return any(at in times for at, _, _ in expected)  # at a step
+
+
 # -- GS-C200 ---------------------------------------------------------------------------------------------------
 
 
@@ -162,10 +226,35 @@ def simple_program(draw: Random) -> Program:
     return Program(tuple(lines), {pin: changes(draw) for pin in (1, 2, 3)})
 
 
+def jumping_program(draw: Random) -> Program:
+    """The same with the jumps of the GS-C200S: back, ahead, to itself, and behind the last instruction's begin."""
+    program = simple_program(draw)
+    lines: list[Line] = []
+    address = 0
+    for line in program.lines:
+        letter, numbers = (line.letter, line.numbers) if line.letter not in "LU" else ("A", (1,))
+        if draw.random() < 0.4:
+            letter, numbers = draw.choice((("j", (0,)), ("jc", (draw.choice((7, 7, 6, 5, 3)), 0))))
+        lines.append(Line(address, letter, numbers))
+        address += Simple.LENGTHS[letter]
+    starts = [line.address for line in lines]
+    lines = [line._replace(numbers=(*line.numbers[:-1], draw.choice(starts))) if line.letter[0] == "j" else line
+             for line in lines]  # fmt: skip
+    return Program(tuple(lines), program.changes)
+
+
 def simple_runs_as_the_datasheet_says(_: History, program: Program) -> bool:
-    bench = ready(gsc200.MODELS[0], History({}, (), ()))
-    bench.play((Say("S50"), Wait(2 * MS), Say("T200"), Wait(2 * MS), Say("P")))
-    bench.play(Say(f"{line.letter}{''.join(map(str, line.numbers))}") for line in program.lines)
+    return runs_as_the_datasheet_says(gsc200.MODELS[0], "P", program)
+
+
+def jumps_lead_where_the_datasheet_says(_: History, program: Program) -> bool:
+    return runs_as_the_datasheet_says(gsc200.MODELS[1], "Po", program)
+
+
+def runs_as_the_datasheet_says(model: gsc200.Module, enter: str, program: Program) -> bool:
+    bench = ready(model, History({}, (), ()))
+    bench.play((Say("S50"), Wait(2 * MS), Say("T200"), Wait(2 * MS), Say(enter)))
+    bench.play(Say(f"{line.letter}{','.join(map(str, line.numbers))}") for line in program.lines)
     bench.out.clear()
     bench.play((Say("E"),))
     begun = play(bench, program, {1: "UI1", 2: "UI2", 3: "UI3"}, 2 * SECOND)
@@ -218,7 +307,9 @@ def status_tells_the_steps_of_its_instant(past: History, wait: Ns) -> bool:
 
 LAWS = {
     "dcb-274": (smc_runs_as_the_manual_says, smc_program),
+    "dcb-274, special trips": (special_trips_act_at_their_very_step, special_program),
     "gs-c200": (simple_runs_as_the_datasheet_says, simple_program),
+    "gs-c200s": (jumps_lead_where_the_datasheet_says, jumping_program),
 }
 
 
