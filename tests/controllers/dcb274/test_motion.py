@@ -375,3 +375,20 @@ def test_on_a_party_line_what_an_input_or_a_start_sets_going_has_its_deadlines()
         assert bench.unit.next_deadline() is not None
         bench.run_to(bench.now + 2 * SECOND)
         assert bench.position == (1 if begin == "STEP" else 40), begin
+
+
+def test_page_46_a_limit_that_closes_on_a_ramp_to_rest_ends_it_by_the_k_of_now_if_that_is_shorter():
+    passed = {}
+    for slope in ("K 5 90", "K 5 2", "K 5 200"):
+        bench = Bench()
+        bench.do("l 32", "K 5 90", "M 5000")
+        bench.do("M 0", wait=150_000_000)
+        bench.do(slope, wait=20_000_000)
+        at = bench.position
+        bench.pin("LIMIT-A", 0)
+        bench.pin("LIMIT-A", 1)
+        bench.pin("LIMIT-A", 0)  # it bounces: the ramp is still one
+        bench.run_to(bench.now + 5_000_000_000)
+        passed[slope] = bench.position - at
+    assert passed["K 5 2"] < 60 < 1000 < passed["K 5 90"]
+    assert passed["K 5 200"] <= passed["K 5 90"] + 90  # what is under way is not made longer

@@ -72,11 +72,6 @@ def a_closed_limit_is_never_passed(data: st.DataObject) -> None:
     at, registers = shaft(bench), bench.unit._settings
     rungs = len(histories.ladder(registers.initial, registers.divide).periods)
     over = registers.ramp[1] * rungs + 1 if registers.flags & 32 else 0
-    train, motion = bench.unit._axis.train, bench.unit._motion
-    if over and train is not None and train.steps is not None:  # a ramp to rest under way is that of an earlier K
-        given = bench.unit._axis.given(bench.now)
-        if motion._stopping or given >= motion._down_from:
-            over = max(over, train.steps - given)
     for deed in data.draw(st.lists(histories.deeds("\x1b", "R 5000", "R -5000"), max_size=8)):
         if deed.what in ("LIMIT-A", "LIMIT-B", "C 0\r") or deed.what.startswith("l "):
             continue

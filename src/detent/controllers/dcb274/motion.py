@@ -72,6 +72,7 @@ class Motion:
         self._energized_at: Ns = -NEVER  # when the current has been at run for w, since it rose last
         self._sets_off: Ns = NEVER  # when the motion that waits for that begins
         self._origin = self._axis.shaft
+        self._limited = False  # a limit has been met since the motion began
         self._stopping = False  # on the way to rest, by a soft stop, M 0 or a new direction
         self._stop_later = False  # a soft stop waits for the end of a ramp
         self._reversed: int | None = None  # M has turned: the period, with its sign, to go on with after the stop
@@ -231,10 +232,11 @@ class Motion:
 
     # -- stopping ----------------------------------------------------------------------------------------
 
-    def soft_stop(self, now: Ns) -> None:
+    def soft_stop(self, now: Ns, *, limited: bool = False) -> None:
         """Decelerate by K to the initial speed and stop; the pulse that is on its way keeps its time.
 
-        A motion that waits for its current (w) has made no step, and makes none.
+        A motion that waits for its current (w) has made no step, and makes none. Where a ramp to rest is under way that
+        goes on, but for a limit (`limited`): K may be another by now, and the shorter one counts.
         """
         self._step_due = NEVER
         train = self._axis.train
@@ -243,10 +245,10 @@ class Motion:
         self._reversed = None
         if self.energizing(now):
             self.halt(now)
-        if self._stopping or self.at_rest:
+        if self.at_rest or (self._stopping and not limited):
             return
         given = self._axis.given(now)
-        if self.course is Course.INDEX and given >= self._down_from:
+        if self.course is Course.INDEX and given >= self._down_from and not limited:
             return  # it stops of itself
         change = timer_table.change(0, self._settings.speeds, timer_table.period_after(train, given), None)
         steps = given + 1 + change.ramp
@@ -300,7 +302,8 @@ class Motion:
             return NOTHING
         if self._ports.limit(self._axis.direction):
             if self._settings.flags & settings.GENTLE:
-                self.soft_stop(now)
+                before, self._limited = self._limited, True
+                self.soft_stop(now, limited=not before)
             else:
                 self.halt(now)
             return News(self.at_rest, limited=True)
@@ -364,7 +367,7 @@ class Motion:
             self._energized_at = now + self._settings.pre_energize * 10 * MS
         start = to_fixed(max(now, self._energized_at))
         self._sets_off = self._energized_at if self._energized_at > now else NEVER
-        self._stopping = False
+        self._stopping = self._limited = False
         self.step_period = NEVER
         self._ports.moving(True, direction, now)
         self._axis.every_pulse = self._ports.pulses_are_wired
