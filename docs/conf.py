@@ -5,9 +5,6 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pygments.lexers import TextLexer
-from sphinx.application import Sphinx
-
 import detent
 
 project = "Detent"
@@ -29,11 +26,6 @@ default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_default_options = {"members": True, "show-inheritance": True}
-
-
-def setup(app: Sphinx) -> None:
-    """Diagrams are shown as the text that they are."""
-    app.add_lexer("mermaid", TextLexer)
 
 
 html_theme = "furo"

@@ -8,7 +8,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Final
@@ -40,6 +40,7 @@ from detent.ticks import show_duration
 sys.path.insert(0, str(Path(__file__).parent))
 
 import cell_keys
+import mode_diagram
 
 DOCS: Final = Path(__file__).parent
 MARKED: Final = re.compile(r"(<!-- generated: (.+?) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -226,23 +227,40 @@ def outcomes(model: str) -> str:
     return table(("command", *(TITLES[state] for state in states)), rows)
 
 
-def diagram() -> str:
-    """The modes and what leads from one to another, as a diagram that is text."""
-    ways: dict[tuple[str, str], dict[str, list[str]]] = {}
+PLACES: Final = {"off": (520, 45), "homing": (105, 210), "ready": (520, 210), "programming": (935, 210),
+                 "running": (520, 430)}  # fmt: skip
+"""Where the modes stand in the picture."""
+
+
+@cache
+def ways() -> dict[tuple[str, str], str]:
+    """What leads from one mode to another, as the firmware does it: commands, and what happens by itself."""
+    found: dict[tuple[str, str], dict[str, list[str]]] = {}
     for model in commands.MODELS:
         for row in commands.rows(model):
             for state in ("ready", "programming", "running", "homing"):
                 _, after = outcome(model, row, state)
                 if after != state:
-                    ways.setdefault((state, after), {}).setdefault(row.name, []).append(model)
+                    found.setdefault((state, after), {}).setdefault(row.name, []).append(model)
         for start, end, why in by_itself(model):
-            ways.setdefault((start, end), {}).setdefault(why, []).append(model)
-    lines = ["```mermaid", "stateDiagram-v2"]
-    lines += [f'    state "{title}" as {state}' for state, title in TITLES.items()]
-    lines.append("    [*] --> off")
-    for (start, end), why in sorted(ways.items(), key=lambda way: [list(TITLES).index(state) for state in way[0]]):
-        lines.append(f"    {start} --> {end} : {', '.join(_only(name, models) for name, models in why.items())}")
-    return "\n".join([*lines, "```"])
+            found.setdefault((start, end), {}).setdefault(why, []).append(model)
+    order = list(TITLES)
+    return {
+        way: ", ".join(_only(name, models) for name, models in found[way].items())
+        for way in sorted(found, key=lambda way: [order.index(state) for state in way])
+    }
+
+
+def diagram() -> str:
+    """The modes and what leads from one to another, drawn and in words."""
+    rows = ((TITLES[start], TITLES[end], why) for (start, end), why in ways().items())
+    drawn = "![Modes of the GS-C200 and what leads from one to another: the table below](../pictures/gsc200-modes.svg)"
+    return f"{drawn}\n\n" + table(("from", "to", "by"), rows)
+
+
+def mode_picture() -> str:
+    """The same as a picture."""
+    return mode_diagram.picture(PLACES, TITLES, ways(), {"ready": 18, "homing": 28, "running": 20, "programming": 34})
 
 
 def by_itself(model: str) -> list[tuple[str, str, str]]:
@@ -268,7 +286,7 @@ def by_itself(model: str) -> list[tuple[str, str, str]]:
     note("off", recall, "power on with REC low")
     for pin in ("EOT", "HOME"):
         recall.cell.set_pin(model, pin, LOW)
-    note("homing", recall, "the same, after power on")
+    note("homing", recall, "EOT, then HOME is 0, where it began at power on")
     return found
 
 
@@ -434,6 +452,7 @@ PARTS: Final[dict[str, Callable[[], str]]] = {
 }
 
 FILES: Final[dict[str, Callable[[], str]]] = {
+    "pictures/gsc200-modes.svg": mode_picture,
     "reference/control-openapi.json": lambda: json.dumps(openapi.document(), indent=1) + "\n",
 }
 """Files that are made as a whole."""
