@@ -165,6 +165,8 @@ def test_many_changes_in_one_instant_are_no_oscillation() -> None:
     for _ in range(400):
         made.set_pin("unit", "UI1", 0)
         made.set_pin("unit", "UI1", 1)
+    assert made.recording is not None
+    assert len([entry for entry in made.recording.of("unit") if isinstance(entry, InputSet)]) == 1600
 
 
 # -- scripts and power ---------------------------------------------------------------------------------------

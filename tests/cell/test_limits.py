@@ -3,17 +3,18 @@
 import pytest
 
 from detent.cell.build import build
+from detent.cell.cell import Cell
 from detent.cell.description import Problem, parse
 
 
-def built(lines: str) -> None:
+def built(lines: str) -> Cell:
     description = parse(f'[units.bar]\nmodel = "gs-c200"\n{lines}\n', "cell.toml")
-    build(description, lambda name: "")
+    return build(description, lambda name: "")
 
 
 @pytest.mark.parametrize("lines", ["supply = 12", "supply = 40.0", 'loads = { "5V" = 0.1, "+VSL" = 0.01, "-VSL" = 0 }'])
 def test_what_the_datasheet_allows_is_taken(lines: str) -> None:
-    built(lines)
+    assert built(lines).wiring.names == ("bar",)
 
 
 @pytest.mark.parametrize(

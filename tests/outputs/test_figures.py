@@ -231,8 +231,9 @@ def test_a_figure_shows_every_axis_and_the_lanes_asked_for():
 @pytest.mark.usefixtures("needs_matplotlib")
 @pytest.mark.parametrize("until", [0, 1, MS, 5 * SECOND])
 def test_a_run_without_motion_can_be_drawn(until, tmp_path):
-    figures.write(tmp_path / "run.png", Signals(Recording(["bar"]), [BAR], until))
-    figures.write(tmp_path / "run.png", Signals(Recording([]), [], until))
+    for name, seen in (("bar", Signals(Recording(["bar"]), [BAR], until)), ("none", Signals(Recording([]), [], until))):
+        figures.write(tmp_path / f"{name}.png", seen)
+        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.usefixtures("needs_matplotlib")

@@ -61,6 +61,7 @@ def test_who_says_nothing_keeps_nobody_waiting() -> None:
                 writer.write(bytes([byte]))
                 await writer.drain()
             await waiting
+            assert not silent.is_closing()
             silent.close()
             writer.close()
 

@@ -78,8 +78,8 @@ def test_page_62_a_motor_supply_outside_4_5_to_34_v_is_told(volts):
 
 @pytest.mark.parametrize("volts", [4.5, 34])
 def test_page_62_the_ends_of_the_range_are_in_it(volts):
-    made(unit=f"supply = {volts}")
-    made(supply=volts, more="resistance = 40")
+    assert made(unit=f"supply = {volts}").controllers()["board"].status(0).state == "starting"
+    assert made(supply=volts, more="resistance = 40").wiring.names == ("board", "m")
 
 
 @pytest.mark.parametrize(

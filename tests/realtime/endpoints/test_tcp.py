@@ -1,4 +1,5 @@
 import contextlib
+import os
 import select
 import socket
 import struct
@@ -270,8 +271,12 @@ def test_what_is_no_address_is_refused_with_an_example(text: str) -> None:
 
 def test_closing_twice_does_no_harm() -> None:
     port = TcpPort(TcpAddress("127.0.0.1", 0), "drill")
+    listening = port.reading(True)
     port.close()
     port.close()
+    for descriptor in listening:
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.fstat(descriptor)
 
 
 def test_a_line_to_which_it_means_something_hears_once_that_a_client_has_left() -> None:
