@@ -4,6 +4,9 @@
 #   make test-all  the slow tests too
 #   make bench     the benchmarks, each with its baseline measured in the same run
 #   make fuzz      units, cells and everything that reads under 10^7 generated frames, an hour at most
+#   make chaos     kills, failing calls, power failures, full disks, stopped processes, bad lines
+#   make soak      a day of virtual time, twice, and an hour of real time, under noise
+#   make pythons   other versions of Python that are here, to be tested for equal recordings
 
 SHELL := /bin/bash
 UV := $(shell command -v uv || echo .uv/bin/uv)
@@ -12,7 +15,7 @@ STAMP := .venv/.installed
 SYSTEM_PACKAGES := sigrok-cli chromium npm
 AXE := axe-core@4.14.1
 
-.PHONY: setup system axe run test test-all check bench fuzz lock docs clean
+.PHONY: setup system axe run test test-all check bench fuzz chaos soak pythons lock docs clean
 
 setup: $(STAMP)
 
@@ -35,8 +38,17 @@ bench: $(STAMP)
 	$(PYTHON) -m bench
 
 # Their short forms are among the slow tests.
-fuzz: $(STAMP)
-	$(PYTHON) -m tests.proofs fuzz
+fuzz chaos soak: $(STAMP)
+	$(PYTHON) -m tests.proofs $@
+
+# What a cell needs to run, in the versions of the lock, for every other Python that is installed.
+pythons: $(STAMP)
+	@for version in 3.12 3.13; do \
+	    $(UV) python find --quiet $$version > /dev/null 2>&1 || { echo "no Python $$version here"; continue; }; \
+	    $(UV) venv --quiet --allow-existing --python $$version .venv/python$$version \
+	        && $(UV) pip install --quiet --python .venv/python$$version --constraint requirements.lock pydantic numpy \
+	        && echo "Python $$version is ready"; \
+	done
 
 # What the reference pages take from the tables, and the pages as a site.
 docs: $(STAMP)

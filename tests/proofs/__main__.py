@@ -3,9 +3,11 @@
 import argparse
 import os
 import sys
+import tempfile
 import time
+from pathlib import Path
 
-from tests.proofs import fuzz
+from tests.proofs import chaos, fuzz, soak
 
 
 def main() -> int:
@@ -17,8 +19,21 @@ def main() -> int:
     fuzzing.add_argument("--frames", type=int, default=10_000_000, help="end when there were so many")
     fuzzing.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
     fuzzing.add_argument("--first", type=int, default=0, help="number of the first case: other numbers are other cases")
+    chaos_of = proofs.add_parser("chaos", help="kills, failing calls, power failures, full disks, bad lines")
+    chaos_of.add_argument("--scale", type=int, default=40, help="how much of each; 1 is the short form")
+    soaking = proofs.add_parser("soak", help="a day of virtual time, twice, and an hour of real time, under noise")
+    soaking.add_argument("--hours", type=float, default=24, help="of virtual time")
+    soaking.add_argument("--seconds", type=float, default=3600, help="of real time")
     asked = parser.parse_args()
     began = time.monotonic()
+    if asked.proof == "chaos":
+        rows = chaos.run(asked.scale, lambda text: print(text, file=sys.stderr))
+        chaos.print_table(rows)
+        return any(row.wrong for row in rows)
+    if asked.proof == "soak":
+        with tempfile.TemporaryDirectory(prefix="detent-soak-") as folder:
+            tell = lambda text: print(text, end="   \r", file=sys.stderr)  # noqa: E731
+            return not soak.run(asked.hours, asked.seconds, Path(folder), tell)
     found = fuzz.run(asked.seconds, asked.frames, asked.jobs, asked.first, lambda text: print(text, file=sys.stderr))
     fuzz.print_table(found, time.monotonic() - began)
     return any(tally.failures for tally in found.values())

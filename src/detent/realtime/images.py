@@ -280,14 +280,15 @@ def _write_whole(path: Path, data: bytes) -> None:
         with contextlib.suppress(OSError):  # the first image, or a file system without such links
             os.link(path, older, follow_symlinks=False)
         os.replace(temporary, path)
-        with contextlib.suppress(FileNotFoundError):
-            os.replace(older, path.with_name(f"{path.name}.old"))
     except OSError:
         for left in (temporary, older):
             with contextlib.suppress(OSError):
                 left.unlink()
         raise
-    with contextlib.suppress(OSError):  # the image is in place; a file system that cannot do more is what it is
+    # the image is in place: from here on nothing is a failure of the save
+    with contextlib.suppress(OSError):
+        os.replace(older, path.with_name(f"{path.name}.old"))
+    with contextlib.suppress(OSError):  # a file system that cannot do more is what it is
         folder = os.open(path.parent, os.O_RDONLY)
         try:
             os.fsync(folder)
