@@ -25,6 +25,8 @@ models gs-c200 extra |
 models --jsn | --json
 workbench gs-c20 | did you mean gs-c200
 workbench gs-c200 --port x | --port
+workbench gs-c200 --at : | cannot be opened
+workbench gs-c200 --at /dev/no-such-port --address 9 | 1 to 7
 workbench {missing}.toml | cannot read it
 serve gs-c20 | did you mean gs-c200
 serve {missing}.toml | cannot read it
@@ -95,6 +97,8 @@ upload gs-c200 {port} {text}.toml | takes a direction
 upload supersigma {port} {text}.toml |
 download gs-c200 {port} {text}.toml | over it with --force
 download gs-c20 {port} | did you mean gs-c200
+download gs-c200 {port} --output {long} | too long
+find \x01 | \\x01
 compare gs-c200 {port} {missing}.src | No such file
 compare-moves gs-c20 S=1 S=2 --motor qsh4218-41-10-035 --moves 100 --supply 24 | did you mean gs-c200
 compare-moves gs-c200 S=1 Q=2 --motor qsh4218-41-10-035 --moves 100 --supply 24 | no setting 'Q'
@@ -140,6 +144,7 @@ def test_a_mistake_is_told_with_what_to_do(
     (tmp_path / "binary.toml").write_bytes(bytes(range(256)))
     (tmp_path / "folder").mkdir()
     names = {name: str(tmp_path / name) for name in ("file", "text", "binary", "folder", "missing")}
+    names["long"] = "x" * 400
     with pytest.raises(SystemExit) as ended:
         main(words.format(port=NO_PORT, **names).split())
     out, err = capsys.readouterr()

@@ -91,7 +91,7 @@ def command() -> None:
 
 def main(tokens: Sequence[str] | None = None) -> None:
     """Run the command line and exit: 0, 1 (it failed), 2 (it was asked wrongly)."""
-    from detent.cli import overview, plain
+    from detent.cli import endings, overview, plain
 
     given = list(sys.argv[1:] if tokens is None else tokens)
     if overview.is_asked_for(given):
@@ -112,13 +112,13 @@ def main(tokens: Sequence[str] | None = None) -> None:
     except CycloptsError as error:
         verb = given[0] if given and given[0] in VERBS else ""
         told = " ".join(str(error).split()) or "this cannot be read"
-        print(f"detent: {told} See: detent {verb} --help".replace("  ", " "), file=sys.stderr)
-        sys.exit(ASKED_WRONGLY)
+        endings.asked_wrongly(f"{told} See: detent {verb} --help".replace("  ", " "))
     except MissingExtra as error:
-        print(f"detent: {error}", file=sys.stderr)
-        sys.exit(ASKED_WRONGLY)
+        endings.asked_wrongly(error)
     except BrokenPipeError:
         _nobody_reads()
+    except OSError as error:  # of a file that a verb has not looked for: a name that is too long, a disk that is gone
+        endings.failed(f"{error.filename}: {error.strerror}" if error.filename else error)
     except KeyboardInterrupt:
         sys.exit(130)
     finally:

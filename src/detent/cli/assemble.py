@@ -16,6 +16,7 @@ from detent.assembler import (
     disassemble,
     listing,
 )
+from detent.cli.endings import tell
 from detent.outputs.files import InTheWay, check_outputs, write_whole
 
 FAILED = 1
@@ -220,11 +221,11 @@ def _write(file: Path, data: bytes) -> None:
     try:
         write_whole(file, data)
     except OSError as error:
-        print(f"detent: {file}: not written: {error.strerror or error}", file=sys.stderr)
+        tell(f"{file}: not written: {error.strerror or error}")
         raise SystemExit(FAILED) from error
 
 
 def _asked_wrongly(message: str) -> SystemExit:
     """The way out after a request that cannot be met; `message` has gone to stderr."""
-    print(f"detent: {message}", file=sys.stderr)
+    tell(message)
     return SystemExit(ASKED_WRONGLY)

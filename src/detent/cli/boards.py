@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from detent.cli import FAILED
+from detent.cli.endings import tell
 
 if TYPE_CHECKING:
     from detent.cell.description import Description
@@ -103,7 +104,7 @@ def _look(address: str) -> "Found | None":
     try:
         port = open_port(address)
     except PortError as error:
-        print(f"detent: {error}", file=sys.stderr)
+        tell(error)
         return None
     try:
         look, end = Look(port), time.monotonic() + LOOK
@@ -113,11 +114,11 @@ def _look(address: str) -> "Found | None":
             left = 0.02 if due is None else min(max((due - time.monotonic_ns()) / 1e9, 0.0), 0.02)
             select.select(port.reading(), port.writing(), (), left)
         if look.found is None:
-            print(f"detent: {address} does not answer as a board with Klipper firmware would; is it flashed, at "
-                  "this baud rate (DEVICE@BAUD), and used by nobody else?", file=sys.stderr)  # fmt: skip
+            tell(f"{address} does not answer as a board with Klipper firmware would; is it flashed, at "
+                 "this baud rate (DEVICE@BAUD), and used by nobody else?")  # fmt: skip
         return look.found
     except PortLost as error:
-        print(f"detent: {error}", file=sys.stderr)
+        tell(error)
         return None
     finally:
         port.close()

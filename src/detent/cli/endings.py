@@ -6,13 +6,19 @@ from typing import NoReturn
 from detent.cli import ASKED_WRONGLY, FAILED
 
 
+def tell(text: object) -> None:
+    """Say something on stderr as every verb does; what would steer a terminal is written out."""
+    shown = "".join(sign if sign.isprintable() or sign in "\n\t" else repr(sign)[1:-1] for sign in str(text))
+    print(f"detent: {shown}", file=sys.stderr, flush=True)
+
+
 def asked_wrongly(error: Exception | str) -> NoReturn:
     """Say what is wrong in one line on stderr and exit with 2."""
-    print(f"detent: {error}", file=sys.stderr)
+    tell(error)
     raise SystemExit(ASKED_WRONGLY)
 
 
 def failed(error: Exception | str) -> NoReturn:
     """Say what failed in one line on stderr and exit with 1."""
-    print(f"detent: {error}", file=sys.stderr)
+    tell(error)
     raise SystemExit(FAILED)

@@ -2,11 +2,11 @@
 
 import json as json_text
 import shlex
-import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from detent.cli import FAILED
+from detent.cli.endings import asked_wrongly, failed, tell
 from detent.cli.unit import flag
 
 if TYPE_CHECKING:
@@ -40,7 +40,6 @@ def find(
     json
         Print what was looked at and what was found as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly, failed
     from detent.hosts.finding import USUAL
     from detent.realtime.addresses import Address
     from detent.realtime.finding import listed, passes_for
@@ -124,7 +123,7 @@ def _look(searches: "list[Search]") -> "tuple[list[tuple[Search, list[Found]]], 
             except (DriverError, Talks) as error:
                 failures[search.port] = f"{search.port}: {error}"
             if search.port in failures:
-                print(f"detent: {failures[search.port]}", file=sys.stderr)
+                tell(failures[search.port])
             before += search.seconds
     return results, failures
 

@@ -59,7 +59,9 @@ def _reading(text: str) -> tuple[tuple[int, int], float]:
     except ValueError:
         dash = ""
     if not (equals and dash):
-        raise ValueError(f"{text!r} is no reading: write LEAD-LEAD=OHMS, like 1-2=10 or 1-3=open")
+        raise ValueError(
+            f"{text!r} is no reading: write LEAD-LEAD=OHMS, leads numbered from 1, like 1-2=10 or 1-3=open"
+        )
     return (min(leads), max(leads)), ohms
 
 

@@ -167,7 +167,10 @@ def workbench(
             place = Place(host, listening.port, token)
             site, units = server.application(bench, chosen, drafts, place, kept)
             if target is not None and at is not None:
-                await units.unit_connect(target, at, written)
+                try:
+                    await units.unit_connect(target, at, written)
+                except ValueError as error:
+                    raise Problem("", "", str(error)) from None
 
             def ready() -> None:
                 if json:
@@ -197,12 +200,14 @@ def workbench(
 def _unit_options(target: str | None, at: str | None, unit: UnitOptions) -> str:
     """The options of a real unit as the page Unit writes them. Raises Problem."""
     from detent.cell.description import Problem
+    from detent.realtime.addresses import Address
 
     if at is None:
         if unit != NO_UNIT_OPTIONS:
             raise Problem("", "", "options of a real unit go with its port: detent workbench MODEL PORT")
         return ""
     try:
+        Address.parse(at)
         given = unit.given(target or "")
     except ValueError as error:
         raise Problem("", "", str(error)) from None

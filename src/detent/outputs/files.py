@@ -31,6 +31,10 @@ def check_outputs(
     for path in paths:
         if path is None:
             continue
+        try:
+            path.exists()
+        except OSError as error:  # a name that is too long
+            raise InTheWay(f"{path}: cannot write it: {error.strerror}") from None
         if any(path.exists() and one.exists() and path.samefile(one) for one in read):
             raise InTheWay(f"{path} is read here, and would be lost: write to another file")
         if path.resolve() in seen:

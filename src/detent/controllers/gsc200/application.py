@@ -46,7 +46,9 @@ def resistors(rest: float, slew: float, ramp: float, drive: str = "GS-D200") -> 
     if ramp > MOST[drive]:
         raise ValueError(f"a {drive} has {MOST[drive]:g} A a phase at most, not {ramp:g} A")
     if not 0 < rest < slew < ramp:
-        raise ValueError(f"currents rise from rest to slew to ramp: {rest:g}, {slew:g}, {ramp:g} A do not")
+        raise ValueError(
+            f"currents rise from rest to slew to ramp, each above the one before: {rest:g}, {slew:g}, {ramp:g} A do not"
+        )
     if slew >= most:
         raise ValueError(f"{slew:g} A at slew is no less than the {most:.3g} A without any resistor: lower it")
     at_rest, at_slew = (_beside(inside, _to_ground(amps)) for amps in (rest, slew))
