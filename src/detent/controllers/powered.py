@@ -5,13 +5,13 @@ A controller says what happens when its supply comes (`_switch_on`) and fails (`
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
 from detent.assembler import ImageError
 from detent.axis import Axis
 from detent.controllers.device import Output, Powered
-from detent.pins import PinDriver
+from detent.pins import Level, PinDriver
 from detent.ticks import NEVER, Ns
 from detent.uart import Format, SerialPort, Transmitter
 
@@ -19,7 +19,9 @@ from detent.uart import Format, SerialPort, Transmitter
 class PoweredDevice(ABC):
     """A device with a supply. `_out` is what it did and has not told, `_driver` sets its output pins."""
 
-    def __init__(self, *, line_timing: bool) -> None:
+    def __init__(self, straps: Mapping[str, Level], *, line_timing: bool) -> None:
+        """`straps` are all of them, as they are tied. Without `line_timing` characters take no time."""
+        self._straps = dict(straps)
         self._line_timing = line_timing
         self._out: list[Output] = []
         self._driver = PinDriver(self._out)
@@ -58,6 +60,11 @@ class PoweredDevice(ABC):
         return out
 
     @property
+    def straps(self) -> Mapping[str, Level]:
+        """How its straps are tied now; what counts is how they were when they were read."""
+        return self._straps
+
+    @property
     @abstractmethod
     def serial_port(self) -> SerialPort:
         """The port towards its host."""
@@ -91,8 +98,8 @@ class PoweredDevice(ABC):
 class OneAxis(PoweredDevice):
     """A controller of one axis, which has no name."""
 
-    def __init__(self, shaft: int, *, line_timing: bool) -> None:
-        super().__init__(line_timing=line_timing)
+    def __init__(self, straps: Mapping[str, Level], shaft: int, *, line_timing: bool) -> None:
+        super().__init__(straps, line_timing=line_timing)
         self._axis = Axis(self._out, shaft)
 
     @property

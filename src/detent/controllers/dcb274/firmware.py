@@ -61,8 +61,7 @@ class Dcb274(OneAxis):
         line_timing: bool = True,
         shaft: int = 0,
     ) -> None:
-        super().__init__(shaft, line_timing=line_timing)
-        self._straps = {**pins.DEFAULT_STRAPS, **(straps or {})}
+        super().__init__({**pins.DEFAULT_STRAPS, **(straps or {})}, shaft, line_timing=line_timing)
         self._overrun, self._p4_input = overrun and line_timing, p4_input
         self._settings = Settings(name)
         self.memory = Memory(settings.factory(name))
@@ -228,11 +227,6 @@ class Dcb274(OneAxis):
     def serial_port(self) -> SerialPort:
         """RX and TX."""
         return pins.SERIAL_PORT
-
-    @property
-    def straps(self) -> Mapping[str, Level]:
-        """How its straps are tied now."""
-        return self._straps
 
     @property
     def line_format(self) -> Format:

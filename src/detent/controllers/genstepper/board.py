@@ -45,10 +45,9 @@ class Board(PoweredDevice):
         self, model: str, straps: Mapping[str, Level] | None = None, *, line_timing: bool = True, shaft: int = 0,
         **order: Any,
     ) -> None:  # fmt: skip
-        super().__init__(line_timing=line_timing)
+        super().__init__({**pins.DEFAULT_STRAPS[model], **(straps or {})}, line_timing=line_timing)
         self.model = model
         self._order = Order(**order)
-        self._straps = {**pins.DEFAULT_STRAPS[model], **(straps or {})}
         self._inputs: dict[str, Level] = {pin.name: pin.rest for pin in self.pins if pin.kind is PinKind.INPUT}
         self._limits = Limits(self._inputs, self._order.hard_stop)
         self._motors = {axis: Motor(Axis(self._out, shaft, axis), self._limits) for axis in AXES}
@@ -165,11 +164,6 @@ class Board(PoweredDevice):
     def serial_port(self) -> SerialPort:
         """SI and SO, whichever way they lead to the host."""
         return pins.SERIAL_PORT
-
-    @property
-    def straps(self) -> Mapping[str, Level]:
-        """How its straps are tied now."""
-        return self._straps
 
     @property
     def most_current(self) -> float:

@@ -39,10 +39,9 @@ class GsC200(OneAxis):
         line_timing: bool = True,
         shaft: int = 0,
     ) -> None:
-        super().__init__(shaft, line_timing=line_timing)
+        super().__init__({**pins.DEFAULT_STRAPS, **(straps or {})}, shaft, line_timing=line_timing)
         self.model = model
         self._separate_clocks = separate_clocks
-        self._straps = {**pins.DEFAULT_STRAPS, **(straps or {})}
         self._clears_on_home = model != GS_C200S
         self._ored = model == GS_C200S or revision >= FIRST_ORED_REVISION
         self._instruction_time = instruction_time
@@ -147,11 +146,6 @@ class GsC200(OneAxis):
     def serial_port(self) -> SerialPort:
         """RXD and TXD."""
         return pins.SERIAL_PORT
-
-    @property
-    def straps(self) -> Mapping[str, Level]:
-        """How its straps are tied now."""
-        return self._straps
 
     @property
     def line_format(self) -> Format:

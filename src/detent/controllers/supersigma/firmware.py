@@ -40,7 +40,7 @@ class Supersigma(OneAxis, WithoutPrograms):
         line_timing: bool = True,
         shaft: int = 0,
     ) -> None:
-        super().__init__(shaft, line_timing=line_timing)
+        super().__init__(pins.DEFAULT_STRAPS, shaft, line_timing=line_timing)
         self.number = number
         self._inputs: dict[str, Level] = {pin.name: pin.rest for pin in pins.PINS if pin.kind is PinKind.INPUT}
         self._motion = Motion(self._axis, self._driver, self._inputs, Program(table, offset, short, braking))
@@ -149,11 +149,6 @@ class Supersigma(OneAxis, WithoutPrograms):
     def line_format(self) -> Format:
         """The pace of the bus."""
         return pins.BUS_FORMAT
-
-    @property
-    def straps(self) -> Mapping[str, Level]:
-        """It has none."""
-        return pins.DEFAULT_STRAPS
 
     def status(self, now: Ns, axis: str = "") -> Status:
         """Half steps from the origin (or from where it was switched on), pulses given since made, and one word.
