@@ -91,6 +91,12 @@ def test_a_cell_is_the_same_with_its_tables() -> None:
         ),
         ('pulse = "5 us"', 'puls = "5 us"', "hardware.slide.puls: there is no such key; did you mean pulse?"),
         ('lead = "20 ms"', 'lead = "1 ms"', "boards.left: lead is 3 to 500 ms; 30 ms do on every computer"),
+        (
+            'lead = "20 ms"',
+            'lead = "8 ms"\nmargin = "4 ms"',
+            "boards.left: margin is 1 ms to a third of the lead, 2.67 ms",
+        ),
+        ('lead = "20 ms"', 'margin = "0 s"', "boards.left: margin is 1 ms to a third of the lead"),
         ('lead = "20 ms"', 'watchdog = "50 ms"', "boards.left: watchdog is at least 200 ms here"),
         ('error = "exact"', 'error = "1 s"', "boards.left.error: the error of a pulse is 'exact'"),
         (

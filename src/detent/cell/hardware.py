@@ -15,6 +15,7 @@ from detent.ticks import MS, SECOND, US, Ns, parse_duration
 
 LEAST_LEAD: Ns = 3 * MS
 MOST_LEAD: Ns = SECOND // 2
+LEAST_MARGIN: Ns = 1 * MS
 LEAST_WATCHDOG: Ns = 200 * MS
 _PIN = re.compile(r"(?P<signs>[!^~ ]*)(?P<name>[^!^~\s]+)")
 
@@ -60,6 +61,9 @@ class Board(_Table):
     own that moves nothing."""
     lead: DurationField = 30 * MS
     """What leaves the pins is so long behind the cell: 3 to 500 ms, the same on all boards of a cell."""
+    margin: DurationField | None = None
+    """A pulse that would be due in less is late, and the rest of its axis slips: 1 ms to a third of the lead; left out:
+    4 ms, or a third of a shorter lead."""
     error: ErrorField = 1 * US
     """How far a pulse may be from its time, 100 us at most; `exact`: the nearest tick."""
     watchdog: DurationField = 2 * SECOND
@@ -73,6 +77,9 @@ class Board(_Table):
             raise ValueError("serial is the device of the board: ls /dev/serial/by-id shows those that are plugged in")
         if not LEAST_LEAD <= self.lead <= MOST_LEAD:
             raise ValueError(f"lead is {LEAST_LEAD // MS} to {MOST_LEAD // MS} ms; 30 ms do on every computer")
+        if self.margin is not None and not LEAST_MARGIN <= self.margin <= self.lead // 3:
+            raise ValueError(f"margin is {LEAST_MARGIN // MS} ms to a third of the lead, {self.lead // 3 / MS:.3g} ms "
+                             "here: leave it out, or take a longer lead")  # fmt: skip
         least = max(LEAST_WATCHDOG, 4 * self.lead)
         if self.watchdog < least:
             raise ValueError(f"watchdog is at least {least // MS} ms here: a busy computer needs that")
@@ -87,7 +94,7 @@ class Driver(_Table):
     half: OutPin | None = None
     """Plain: high while half of the current will do."""
     amperes: Annotated[Number, Field(gt=0)] | None = None
-    """A: of a phase, for full power; a controller may command them."""
+    """A: of a phase, for full power; the most that the chip is told, where the controller commands amperes."""
     sense: Annotated[Number, Field(gt=0)] = 0.11
     """Ohm: the sense resistors."""
     microsteps: Literal[1, 2, 4, 8, 16, 32, 64] | None = None

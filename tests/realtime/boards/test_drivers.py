@@ -67,6 +67,10 @@ def test_currents() -> None:
 def test_amperes_of_a_controller_that_chops() -> None:
     stage = Stage(sequence=1, places=64, run=0.8, hold=0.4, settling=SECOND, chops=True)
     assert values(chip(amperes=None), stage) == values(chip(amperes=3.0), stage)
+    less = values(chip(amperes=0.6), stage)
+    full = 0.180 / 0.13 / 2**0.5
+    assert less["IHOLD_IRUN"] >> 8 & 31 == round(0.6 / full * 32) - 1  # the most
+    assert less["IHOLD_IRUN"] & 31 == round(0.4 / full * 32) - 1  # as commanded
 
 
 def test_the_5160_scales_with_its_scaler() -> None:
@@ -94,7 +98,7 @@ def test_times() -> None:
     ("made", "stage", "key", "said"),
     [
         (chip(amperes=None), HALF, "amperes", "amperes = 0.8"),
-        (chip(amperes=2.5), HALF, "sense", "gives 1.74 A a phase, not 2.50"),
+        (chip(amperes=2.5), HALF, "sense", "gives 1.74 A a phase, not 2.50: say that less will do, amperes = 1.7, or "),
         (chip("tmc5160", sense=0.075, amperes=4.0), HALF, "sense", "gives 3.06 A a phase, not 4.00"),
         (chip(sense=0.0), HALF, "sense", "write it in ohm"),
         (chip(), HALF._replace(places=24), "kind", "24/64 of a full step a pulse"),

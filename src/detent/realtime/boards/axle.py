@@ -21,6 +21,7 @@ class Axle:
         self.motions: Channel[Motion] = Channel()
         self.standing, self.why, self.known = Standing.WAITING, "", True
         self.stops = 0
+        self.limited = 0.0  # amperes that were asked of its driver and are more than it gives; told
         self.held: tuple[str, int] | None = None  # which input stopped it last, and where
         self.singles = 0  # so many times in a row a single pulse after the last time
         self.rested: Ns | None = 0  # since when it is at rest; None while it moves

@@ -287,8 +287,14 @@ class Leaving:
         if stage is None:
             return
         if axle.what.driver:
+            driver = self.boards.drivers[axle.what.driver]
+            asked, most = max(stage.run, stage.hold), driver.setup.amperes
+            if stage.chops and most is not None and asked > most and axle.limited != asked:
+                axle.limited = asked
+                what = f"{axle.what.unit} commands {asked:g} A a phase"
+                self._say(Weight.NOTE, f"{axle.name}: {what}, and its driver gives {most:g} A (amperes)")
             try:
-                self.boards.drivers[axle.what.driver].command(stage)
+                driver.command(stage)
             except SetupProblem as problem:
                 self._fault(axle, str(self.plan.problem(problem)))
 

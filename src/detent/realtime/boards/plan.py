@@ -107,7 +107,7 @@ class _Hang:
         self.drivers: list[DriverSetup] = []
 
     def setup(self, name: str, board: Board) -> BoardSetup:
-        margin = max(min(MOST_MARGIN, board.lead // 3), MS)
+        margin = board.margin or max(min(MOST_MARGIN, board.lead // 3), MS)
         return BoardSetup(name, board.lead, board.error, margin, tuple(self.steppers), tuple(self.outs),
                           tuple(self.inputs), tuple(self.drivers))  # fmt: skip
 

@@ -4,7 +4,7 @@ From the data sheets of Trinamic (now Analog Devices): TMC2208 rev. 1.13, TMC220
 TMC5160 rev. 1.17; sections are named where they matter.
 """
 
-from math import sqrt
+from math import floor, sqrt
 from typing import NamedTuple
 
 from detent.controllers.device import Stage
@@ -62,7 +62,7 @@ def settings(chip: DriverSetup, stage: Stage) -> list[Written]:
 def _amperes(chip: DriverSetup, current: float, stage: Stage) -> float:
     """A phase current in amperes: what `amperes` of the setup stands for, or what the controller says itself."""
     if stage.chops:
-        return current
+        return current if chip.amperes is None else min(current, chip.amperes)
     if chip.amperes is None:
         raise SetupProblem(chip.name, "amperes", "the controller commands fractions of full power; say how many "
                            "amperes a phase that is, like amperes = 0.8")  # fmt: skip
@@ -92,8 +92,10 @@ def _scaled(chip: DriverSetup, most: float) -> tuple[float, bool, int | None]:
 
 
 def _too_much(chip: DriverSetup, most: float, full: float) -> SetupProblem:
-    return SetupProblem(chip.name, "sense", f"a {chip.kind} with {chip.sense:g} ohm gives {full:.2f} A a phase, not "
-                        f"{most:.2f}: take a smaller resistor, or another driver")  # fmt: skip
+    limit = floor(full * 10) / 10
+    what = f"a {chip.kind} with {chip.sense:g} ohm gives {full:.2f} A a phase, not {most:.2f}"
+    remedy = f"say that less will do, amperes = {limit:g}, or take a smaller resistor or another driver"
+    return SetupProblem(chip.name, "sense", f"{what}: {remedy}")
 
 
 def _in_32nds(chip: DriverSetup, current: float, full: float) -> int:

@@ -105,7 +105,7 @@ class DriverSetup:
     """A stepper driver chip whose registers are set. `sense` is its resistor in ohm.
 
     `amperes` is the current of a phase (its peak / sqrt 2: RMS at rest between the steps) that stands for full power
-    where a controller commands fractions of it; a controller that commands amperes needs none.
+    where a controller commands fractions of it; of one that commands amperes it is the most that the chip is told.
     UART: `uart` (one wire; or `uart` receives and `transmit` sends), `address` 0..3 of a TMC2209.
     SPI: `select`, and either a hardware `bus` by its name in the dictionary, or the pins `clock`, `mosi`, `miso`.
     `quiet` (stealthChop) while slow decay is asked for.
