@@ -166,7 +166,7 @@ def _check(
     from detent.cell.description import Problem
     from detent.cli.endings import asked_wrongly, failed
     from detent.controllers.catalogue import unknown
-    from detent.realtime.boards.checking import MOST_RATE, Check, Trouble
+    from detent.realtime.boards.checking import LEAD, MOST_RATE, Check, Trouble
     from detent.realtime.boards.drive import Opened, RealPins
     from detent.realtime.cell_source import find_cell
 
@@ -178,7 +178,7 @@ def _check(
             raise Problem("", "--speed", f"{speed}: 1 to {MOST_RATE} pulses a second, as there is no ramp")
         if watch is not None and not 0 <= watch <= 86_400:
             raise Problem("", "--watch", f"{watch:g}: 0 to 86400 seconds")
-        opened = Opened(found.description, found.read, RealPins(lambda news: None))
+        opened = Opened(found.description, found.read, RealPins(lambda news: None), least_lead=LEAD)
     except Problem as problem:
         asked_wrongly(problem)
     legs: dict[str, list[Leg]] = {}

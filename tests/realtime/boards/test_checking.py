@@ -4,13 +4,15 @@ import pytest
 from tests.realtime.boards.driven_bench import no_file
 from tests.realtime.boards.test_real_service import Wall
 
+from detent.cell.build import build
 from detent.cell.description import Problem, parse
-from detent.realtime.boards.checking import Check, Leg, Trouble
+from detent.realtime.boards.checking import LEAD, Check, Leg, Trouble
 from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.chips import Chips
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
+from detent.realtime.boards.plan import plan
 from detent.ticks import MS
 
 CELL = """
@@ -50,6 +52,15 @@ class Bench:
     def settle(self) -> None:
         for _ in range(20):
             self.check.turn(5 * MS)
+
+
+def test_a_check_has_time_as_far_as_watchdogs_let_it() -> None:
+    """A lead of 200 ms, so that a busy computer is not late; a quarter of the shortest watchdog where that is less."""
+    for text, lead in ((CELL, 200), (CELL.replace('"fake:"', '"fake:"\nwatchdog = "400 ms"'), 100)):
+        described = parse(text, "cell.toml")
+        controllers = build(described, no_file).controllers()
+        assert plan(described, controllers, LEAD).setups[0][0].lead == lead * MS
+        assert plan(described, controllers).setups[0][0].lead == 30 * MS
 
 
 def test_nothing_moves_and_no_driver_is_on_while_inputs_are_looked_at() -> None:

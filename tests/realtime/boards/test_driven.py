@@ -331,6 +331,66 @@ def test_a_board_that_was_restarted_does_not_know_where_the_motor_is() -> None:
         assert bench.driven.axes()[0].shaft == 25
 
 
+@pytest.mark.parametrize("away", [True, False])
+@pytest.mark.parametrize("after", [0, 2, 5, 10, 20, 50, 200, 600, 800])
+def test_an_emergency_stop_while_a_board_comes_back_stands_until_the_next_recover(after: int, away: bool) -> None:
+    """Whatever its board is about: not there yet, connecting, being configured, ready."""
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+400")
+        bench.run(300 * MS)
+        if away:
+            bench.ports["b"].unplugged = True
+        else:
+            bench.driven.stop()
+        bench.run(100 * MS)
+        bench.driven.recover()
+        bench.run(after * MS // 2)
+        bench.ports["b"].unplugged = False
+        bench.run(after * MS // 2)
+        bench.driven.stop()
+        stopped = bench.position("x")
+        bench.run(3 * SECOND)
+        bench.type("x", "+10")
+        bench.run(200 * MS)
+        assert bench.driven.axes()[0].standing is Standing.FAULT
+        assert bench.position("x") == stopped
+        bench.driven.recover()
+        bench.run(3 * SECOND)
+        assert bench.driven.axes()[0].standing is Standing.DRIVEN
+        bench.type("x", "-7")
+        bench.rest()
+        assert bench.position("x") == bench.driven.axes()[0].shaft == stopped - 7
+
+
+def test_where_a_motor_stands_is_known_again_when_a_switch_has_stopped_it_and_not_before() -> None:
+    switches = {"x.EOT": ("x", 60, 10**6), "x.HOME": ("x", -(10**6), 40)}
+    with Bench(CELL, switches=switches) as bench:
+        bench.run(100 * MS)
+        bench.ports["b"].unplugged = True
+        bench.run(500 * MS)
+        bench.ports["b"].board.clear()
+        bench.ports["b"].unplugged = False
+        bench.driven.recover()
+        bench.run(5 * SECOND)
+        bench.driven.stop()
+        bench.run(100 * MS)
+        bench.driven.recover()
+        bench.run(SECOND)
+        state = bench.driven.axes()[0]
+        assert (state.standing, state.known) == (Standing.DRIVEN, False)
+        assert "since the restart nobody knows where the motor stands" in bench.news[-1].text
+        bench.type("x", "+50")
+        bench.rest()
+        assert not bench.driven.axes()[0].known
+        bench.type("x", "H+")
+        bench.run(500 * MS)
+        bench.rest()
+        state = bench.driven.axes()[0]
+        assert state.stops == 2
+        assert state.known
+
+
 def test_a_count_that_differs_is_a_fault() -> None:
     with Bench(CELL) as bench:
         bench.run(100 * MS)

@@ -20,6 +20,7 @@ class Axle:
         self.what, self.stepper, self.guard = what, stepper, guard
         self.motions: Channel[Motion] = Channel()
         self.standing, self.why, self.known = Standing.WAITING, "", True
+        self.lost = False  # its board was without supply, and no switch has stopped it since: nobody knows its place
         self.stops = 0
         self.limited = 0.0  # amperes that were asked of its driver and are more than it gives; told
         self.held: tuple[str, int] | None = None  # which input stopped it last, and where

@@ -338,7 +338,7 @@ class Board:
     # -- what goes wrong
 
     def emergency_stop(self, wall: WallNs) -> None:
-        """Stop everything at once; `ShutDown` follows."""
+        """Stop everything at once; `ShutDown` follows. One that is on its way back does not come before `recover`."""
         if self.state in (State.READY, State.CONFIGURING):
             self.core.link.drop_waiting()
             self.core.command("emergency_stop")
@@ -346,6 +346,9 @@ class Board:
             self.reason = "emergency stop"
             self.core.events.append(ShutDown(self.name, self.reason))
             self.core.link.flush(wall)
+        elif self.state is State.CONNECTING and self._known:
+            self._fall(State.LOST)
+            self.reason = "emergency stop"
 
     def recover(self, wall: WallNs) -> None:
         """Make it ready again after ShutDown or Lost (of which the port is open again); `Recovered` follows.

@@ -23,6 +23,7 @@ USUAL_MICROSTEPS = 2  # a plain driver in half steps
 MOST_RATE = 2000  # steps/s: no ramp is driven
 WAKING: Ns = 300 * MS  # from enabling a driver to the first step
 ENDING: Ns = 60 * MS  # two reports of a stop
+LEAD: Ns = 200 * MS  # nobody waits for a jog, and a busy computer is not late
 PATIENCE: Ns = 3 * SECOND  # for the count, behind the last step
 
 

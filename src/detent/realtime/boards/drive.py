@@ -9,7 +9,9 @@ from typing import NamedTuple
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import Description
+from detent.outputs.steps import Error, Runs, Scale
 from detent.pins import Level
+from detent.pulses import Train, Uniform
 from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.opening import Sleep, boards_of, make_ready, set_drivers
 from detent.realtime.boards.plan import Plan, plan
@@ -19,7 +21,9 @@ from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.several import Boards
 from detent.realtime.boards.stages import stages
 from detent.realtime.boards.states import News
+from detent.realtime.boards.stepper import LONGEST
 from detent.realtime.pace import Pace, WallNs
+from detent.ticks import Ns
 
 PRIORITY = 20  # of the real-time class: above most, below what the system keeps for itself
 
@@ -39,17 +43,23 @@ class RealPins(NamedTuple):
 class Opened:
     """The boards of a cell, ready, before there is a cell. `inputs` are what their inputs are at, by UNIT and PIN."""
 
-    def __init__(self, described: Description, read: Callable[[str], str], real: RealPins) -> None:
-        """Open them. Raises Problem. Nothing moves, and no output but those with a level at rest changes."""
+    def __init__(
+        self, described: Description, read: Callable[[str], str], real: RealPins, *, least_lead: Ns = 0
+    ) -> None:
+        """Open them. Raises Problem. Nothing moves, and no output but those with a level at rest changes.
+
+        `least_lead` is for whoever has time: a busy computer is not late then.
+        """
         self._real = real
         trial = build(described, read)
-        self.plan: Plan = plan(described, trial.controllers())
+        self.plan: Plan = plan(described, trial.controllers(), least_lead)
         self.stages = stages(self.plan, trial)
         """What the power stage of each stepper is told at first."""
         self.boards: Boards = boards_of(self.plan, real.open_port)
         try:
             self._levels: dict[str, Level] = make_ready(self.boards, self.plan, real.wall, real.sleep)
             set_drivers(self.boards, self.plan, self.stages, real.wall, real.sleep)
+            _warm_up(self.plan.setups[0][0].error)
         except BaseException:
             self.boards.close()
             raise
@@ -77,6 +87,12 @@ class Opened:
         """The cell's present is now; from here on pulses leave."""
         driven.on_moving = _no_collection_while
         driven.begin(pace, self._levels)
+
+
+def _warm_up(error: Error) -> None:
+    """Do once what the first pulses need: the first time it takes some milliseconds, and a busy computer has none."""
+    train = Train((Uniform.at_rate(0, 1000, 300),), 0)
+    Runs(train, Scale(12_000_000), error, -1, longest=LONGEST).take()
 
 
 def _no_collection_while(moving: bool) -> None:

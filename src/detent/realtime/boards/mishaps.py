@@ -91,7 +91,7 @@ class Mishaps(TakingBack):
         first = axle.standing is not Standing.FAULT
         self.cell.halt(axle.what.unit)
         self._absorb()  # the stepper is told, while it still is
-        axle.standing, axle.why, axle.known = Standing.FAULT, why, known
+        axle.standing, axle.why, axle.known = Standing.FAULT, why, known and not axle.lost
         axle.guard.want({}, self.cell.now, self.cell.now)  # what has left is watched until it is over
         self.past.clear()
         if first:
@@ -147,13 +147,16 @@ class Mishaps(TakingBack):
                 what = f"{axle.name}: board {event.board} was restarted, and nobody knows where the motor stands"
                 self._say(Weight.WARNING, f"{what}: send it home before anything else")
                 axle.stepper.adopt(axle.shaft_at(self.cell.now))
+                axle.lost = True
             else:
                 self._place(axle, shaft)
                 axle.stepper.rewind(shaft)
                 what = f"{axle.name} goes on at {shaft}, as the board has counted"
-                self._say(Weight.WARNING, f"{what}; the motor may have lost steps when it was stopped")
+                unsure = "the motor may have lost steps when it was stopped"
+                if axle.lost:
+                    unsure = "since the restart nobody knows where the motor stands"
+                self._say(Weight.WARNING, f"{what}; {unsure}")
             self._driven_again(axle)
-            axle.known = shaft is not None
         for name, level in event.inputs.items():
             self._raw[name] = int(level)
             if self._given.get(name) != int(level):
@@ -167,7 +170,7 @@ class Mishaps(TakingBack):
 
     def _driven_again(self, axle: Axle) -> None:
         axle.guard.release()
-        axle.standing, axle.why, axle.known = Standing.DRIVEN, "", True
+        axle.standing, axle.why, axle.known = Standing.DRIVEN, "", not axle.lost
         unit = self.cell.unit(axle.what.unit)
         for out in self._outs.values():
             levels = out.levels.before(out.levels.count)

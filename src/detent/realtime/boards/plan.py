@@ -61,8 +61,11 @@ class Plan(NamedTuple):
         return Problem(self.file, key, str(fault.args[0]) if not hasattr(fault, "text") else fault.text)
 
 
-def plan(described: Description, controllers: Mapping[str, Controller]) -> Plan:
-    """What hangs where, of a cell that `build` has found sound. Raises Problem where nothing does."""
+def plan(described: Description, controllers: Mapping[str, Controller], least_lead: Ns = 0) -> Plan:
+    """What hangs where, of a cell that `build` has found sound. Raises Problem where nothing does.
+
+    The lead is at least `least_lead`, as far as watchdogs allow.
+    """
     if not described.hardware:
         raise Problem(described.file, "hardware", "no pin of this cell is real: add [boards.NAME] and [hardware.UNIT]")
     axes, keys = [], {}
@@ -90,8 +93,10 @@ def plan(described: Description, controllers: Mapping[str, Controller]) -> Plan:
             mine = [(k, t) for k, t in described.hardware.items() if k.partition(".")[0] == unit]
             stops = tuple(f"{unit}.{pin}" for _, t in mine if t.board == table.board for pin in t.inputs)
             axes.append(_axis(what, table, controller, board, here, keys, stops))
-    setups = tuple((hang[name].setup(name, described.boards[name]), described.boards[name].serial) for name in used)
     boards = [described.boards[name] for name in used]
+    longest = min(least_lead, *(board.watchdog // 4 for board in boards))
+    boards = [board.model_copy(update={"lead": max(board.lead, longest)}) for board in boards]
+    setups = tuple((hang[name].setup(name, board), board.serial) for name, board in zip(used, boards, strict=True))
     held = all(board.replies == "held" for board in boards)
     lead = max(board.lead for board in boards)
     return Plan(setups, tuple(axes), outs, inputs, board_of, lead, held, described.file, keys)

@@ -253,7 +253,8 @@ class Boards:
                 self._reopen(board, port, wall)
 
     def emergency_stop(self, wall: WallNs) -> None:
-        """Stop every board at once."""
+        """Stop every board at once. None comes back by itself."""
+        self._reopen_at.clear()
         for board, port in self._pairs:
             board.emergency_stop(wall)
             self._pump(board, port, wall)

@@ -47,6 +47,8 @@ class TakingBack(Leaving):
             return
         # what the switches of this axis are at was so at the stop already: it stands, and reports take their time
         switches = {(unit, other) for other in self.cell.controller(unit).switches(axle.what.axis)}
+        if (unit, pin) in switches:
+            axle.lost, axle.known = False, True  # as far as a switch tells it
         others = {
             name: int(found)
             for name, found in event.levels.items()
