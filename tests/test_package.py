@@ -106,6 +106,18 @@ def test_the_core_runs_without_any_extra(bare: Environment, tmp_path: Path) -> N
 
 
 NEEDING = {
+    "distributed": [
+        "tune",
+        "gs-c200",
+        "--motor",
+        "qsh4218-41-10-035",
+        "--supply",
+        "24",
+        "--moves",
+        "200",
+        "--workers",
+        "2",
+    ],
     "epics": ["epics", "gs-c200"],
     "figures": ["run", "gs-c200", "--send", "+10", "--plot", "p.png"],
     "workbench": ["workbench", "gs-c200"],
