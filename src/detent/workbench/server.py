@@ -7,7 +7,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import nicegui
 import uvicorn
@@ -16,6 +16,8 @@ from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 import detent
+from detent.realtime.endpoints.endpoint import OUT_OF_DESCRIPTORS
+from detent.realtime.polling import allow_many
 from detent.realtime.system import ended_by_signals
 from detent.workbench import filing, shell
 from detent.workbench.beginning import Beginning
@@ -23,6 +25,7 @@ from detent.workbench.board import Board
 from detent.workbench.drafts import Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.guard import Guard, names_of_this_machine
+from detent.workbench.hurried import Hurried
 from detent.workbench.listening import Listening, Place
 from detent.workbench.live import Live
 from detent.workbench.pages import Page, Window, begin, cell, motion, program, scope, terminal, unit
@@ -88,11 +91,13 @@ def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place, st
 async def serve(application: Guard, listening: Listening, ready: Callable[[], None]) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. `ready` is called once a browser may come."""
     config = uvicorn.Config(
-        application, log_level="warning", lifespan="on", ws="wsproto", ws_per_message_deflate=False,
+        application, http=Hurried, log_level="error", lifespan="on", ws="wsproto", ws_per_message_deflate=False,
         timeout_graceful_shutdown=PATIENCE, access_log=False, server_header=False, ws_max_size=4 << 20,
     )  # fmt: skip
     server = _Server(config)
     loop = asyncio.get_running_loop()
+    loop.set_exception_handler(_told)
+    allow_many()
     with ended_by_signals(loop, server.end):
         serving = asyncio.create_task(server.serve(sockets=[listening.socket]))
         telling = asyncio.create_task(server.told_started(ready))
@@ -100,6 +105,13 @@ async def serve(application: Guard, listening: Listening, ready: Callable[[], No
             await serving
         finally:
             telling.cancel()
+
+
+def _told(loop: asyncio.AbstractEventLoop, told: dict[str, Any]) -> None:
+    """What goes wrong beside everything; not that descriptors run out, which a client may bring about at will."""
+    error = told.get("exception")
+    if not isinstance(error, OSError) or error.errno not in OUT_OF_DESCRIPTORS:
+        loop.default_exception_handler(told)
 
 
 class _Server(uvicorn.Server):
