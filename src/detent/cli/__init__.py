@@ -9,13 +9,13 @@ import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from detent.cli.codes import FAILED
+
 if TYPE_CHECKING:
     from cyclopts import App
 
 TITLE = "Intelligent stepper motor controllers in software, exact to the pulse."
 COMPLETION = "Write the script that completes detent in your shell."
-FAILED = 1
-ASKED_WRONGLY = 2
 
 VERBS = {
     "demo": ("detent.cli.demo:demo", "Run an example cell, tell what happens, and draw it."),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from detent.cli import FAILED
+from detent.cli.codes import FAILED
 from detent.cli.endings import tell
 
 if TYPE_CHECKING:

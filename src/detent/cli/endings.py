@@ -3,7 +3,7 @@
 import sys
 from typing import NoReturn
 
-from detent.cli import ASKED_WRONGLY, FAILED
+from detent.cli.codes import ASKED_WRONGLY, FAILED
 
 
 def tell(text: object) -> None:

@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from detent.cli import FAILED
+from detent.cli.codes import FAILED
 from detent.cli.endings import asked_wrongly, failed, tell
 from detent.cli.unit import flag
 

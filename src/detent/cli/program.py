@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast
 from cyclopts import Parameter
 
 from detent.assembler import Assembly, AssemblyFailed, Language, assemble
-from detent.cli import ASKED_WRONGLY, FAILED
+from detent.cli.codes import ASKED_WRONGLY, FAILED
 from detent.cli.unit import NO_UNIT_OPTIONS, ModelName, PortName, UnitOptions
 
 if TYPE_CHECKING:

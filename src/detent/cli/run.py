@@ -84,7 +84,8 @@ def run(
     from detent.cell.circuit import Oscillation
     from detent.cell.conversation import Conversation
     from detent.cell.description import Problem
-    from detent.cli import FAILED, exports, outcome, sending
+    from detent.cli import exports, outcome, sending
+    from detent.cli.codes import FAILED
     from detent.cli.endings import asked_wrongly, failed
     from detent.motors.motor import MotorError
     from detent.realtime.cell_source import find_cell

@@ -85,7 +85,7 @@ def serve(
         Print one line of JSON once everything is open, and nothing else.
     """
     from detent.cell.description import Problem
-    from detent.cli import FAILED
+    from detent.cli.codes import FAILED
     from detent.cli.endings import asked_wrongly, failed
     from detent.realtime.boards.drive import take_priority
     from detent.realtime.cell_source import find_cell

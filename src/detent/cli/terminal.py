@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from detent.cli import FAILED
+from detent.cli.codes import FAILED
 from detent.cli.send import escaped, shown
 from detent.cli.unit import NO_UNIT_OPTIONS, UnitOptions
 

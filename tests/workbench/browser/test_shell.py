@@ -206,7 +206,7 @@ def test_on_a_phone_the_pause_is_explained_and_the_alarm_fits(windows: Windows, 
 def test_a_crash_of_the_cell_is_told_loses_no_draft_and_is_mended_with_a_click(guarded: Window) -> None:
     guarded.call("keep_draft", "slide", "+250 ; not yet loaded\n", "")
     children = Path(f"/proc/{guarded.process}/task/{guarded.process}/children").read_text().split()
-    engine = next(pid for pid in children if b"engine" in Path(f"/proc/{pid}/cmdline").read_bytes())
+    engine = next(pid for pid in children if b"workbench.process" in Path(f"/proc/{pid}/cmdline").read_bytes())
     os.kill(int(engine), signal.SIGKILL)
     guarded.page.get_by_role("alert").first.wait_for()
     assert guarded.call("draft", "slide")["text"] == "+250 ; not yet loaded\n"
