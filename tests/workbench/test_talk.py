@@ -99,6 +99,48 @@ def test_the_dcb_274_signs_on_echoes_and_refuses_with_a_hash() -> None:
     assert units[-1].wrong
 
 
+def notes(model: str, *lines: str) -> list[str]:
+    """What the unit's rows say in words."""
+    told = alone(model)
+    told.run(500 * MS)
+    return [row.note for row in exchange(told, *lines) if row.sender]
+
+
+def test_answers_are_explained_by_what_they_answer() -> None:
+    """Datasheet of the GS-C200, V: inputs, then outputs, UI1 and UO1 the least significant."""
+    assert notes("gs-c200", "A2", "V2", "V1") == [
+        "done, or begun", "UI1=1, UI2=1, UI3=1, UO1=0, UO2=1, UO3=0", "position 0",
+    ]  # fmt: skip
+
+
+def test_answers_of_the_dcb_274_are_explained_by_its_table() -> None:
+    """Manual of the DCB-274, pages 35, 52 to 54 and 56."""
+    told = alone("dcb-274")
+    told.history.do(SetPin("dcb-274", "HOME", 0))
+    told.history.do(SetPin("dcb-274", "P2", 0))
+    lines = ["X", "Z", "^", "] 0", "A 129", "] 1", "[ 0 2"]
+    found = [row.note for row in exchange(told, *lines) if row.sender and row.data[:1] != b" "][1:]
+    assert found[0].startswith("ramp slopes 5/5, initial velocity 802, slew velocity 10370, divide all speeds 1, ")
+    assert found[1:] == [
+        "position 0", "0: at rest", "active: HOME, P2", "active ports: P2", "active: none", "the bytes 235 233",
+    ]  # fmt: skip
+
+
+def test_reports_of_a_genstepper_are_explained_by_its_tables() -> None:
+    """Manual of the BS0610, pages 39 to 43."""
+    found = notes("bs0610", "0?", "-8?", "5?")[-3:]
+    assert "X: current location 0, current speed 80," in found[0]
+    assert "windings 0 (off)" in found[0]
+    assert found[1] == "X: step action 0 (idle); Y: step action 0 (idle)"
+    assert found[2].startswith("X: limits 15 (LY-, LY+, LX-, LX+)")
+
+
+def test_a_blank_is_seen_as_a_key() -> None:
+    assert shown(b" ") == "SPACE"
+    assert shown(b"  \r") == "SPACE SPACE CR"
+    assert shown(b"Z  0") == "Z  0"
+
+
 def test_genstepper_commands_are_a_number_and_a_character_and_answers_end_with_the_prompt() -> None:
     """Manual of the BS0610, pages 22 and 39 to 43."""
     told = alone("bs0610")

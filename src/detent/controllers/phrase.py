@@ -4,6 +4,7 @@ A controller's `phrases` reads frames by the same tables as its firmware. It jud
 whether a command may come now is the controller's answer to tell.
 """
 
+from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 
 
@@ -32,8 +33,13 @@ class Phrases(Protocol):
     def whole(self, data: bytes, to_unit: bool) -> bool:
         """Whether `data`, said to a unit or by one, is a whole frame."""
 
-    def read(self, data: bytes, to_unit: bool) -> Phrase:
-        """What a whole frame, or what has come of it, says."""
+    def read(self, data: bytes, to_unit: bool, asked: bytes = b"") -> Phrase:
+        """What a whole frame, or what has come of it, says; of an answer, to what was `asked` last on the line."""
+
+
+def named_bits(value: int, names: Iterable[tuple[int, str]]) -> str:
+    """The bits that `names` gives a name, as a person reads them: those that are set, or none."""
+    return ", ".join(name for bit, name in names if value & bit) or "none"
 
 
 class Lines:
@@ -43,7 +49,7 @@ class Lines:
         """At LF, and towards the unit at CR."""
         return data[-1:] == b"\n" or (to_unit and data[-1:] == b"\r")
 
-    def read(self, data: bytes, to_unit: bool) -> Phrase:
+    def read(self, data: bytes, to_unit: bool, asked: bytes = b"") -> Phrase:
         """The text as it is."""
         text = data.rstrip(b"\r\n")
         pieces = (

@@ -5,11 +5,12 @@ answered comes back as it was said, with its meaning where the manual gives one.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import singledispatch
 from typing import Final, NamedTuple, TypeAlias
 
 from detent.hosts.dcb274 import Dcb274
+from detent.hosts.dcb274.answers import MOVING, Inputs, JogInputs, Ports
 from detent.hosts.dcb274.ranges import LARGEST_ADDRESS
 from detent.hosts.errors import BadAnswer, MotionFailed, NoAnswer, Refused, Spoken
 from detent.hosts.exchange import Ask, Clear, Driver, Rest, Steps
@@ -264,7 +265,31 @@ def _dcb274(driver: Dcb274, text: str, seconds: float, heard: Heard) -> Steps[Sa
     answer = yield from driver.command(text, seconds)
     if re.fullmatch(r"P ?\d*", text):
         driver.programming = text != "P"
-    return Said((answer,) if answer.strip() else (), "" if answer.strip() else "done")
+    return Said((answer,) if answer.strip() else (), _answered(text, answer.strip()) if answer.strip() else "done")
+
+
+def _answered(text: str, answer: str) -> str:
+    """The manual's words for what a line was answered (pages 35, 53, 54 and 56)."""
+    asked = re.fullmatch(r"(?P<what>[Z^\]A]) *(?P<of>\d*)", text)
+    if asked is None or not re.fullmatch(r"-?\d+", answer):
+        return ""
+    value = int(answer)
+    match asked["what"], asked["of"]:
+        case "Z", _:
+            return f"position {value}"
+        case "^", "":
+            return MOVING.get(value, "")
+        case "]", "1":
+            return _active(JogInputs.of(value)._asdict())
+        case "]", _:
+            return _active(Inputs.of(value)._asdict())
+        case "A", "129":
+            return _active(Ports.of(value)._asdict())
+    return ""
+
+
+def _active(flags: Mapping[str, bool]) -> str:
+    return "active: " + (", ".join(name.replace("_", " ") for name, on in flags.items() if on) or "none")
 
 
 _SINGLE: Final = {

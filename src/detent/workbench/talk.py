@@ -82,6 +82,7 @@ class _Line:
         self.rows: list[Row] = []
         self.first = 0  # the number of the first of them
         self._open: dict[str, _Open] = {}
+        self._asked = b""  # what the host said last
         self._seen = 0
 
     def update(self, mirror: Mirror, now: Ns) -> None:
@@ -137,7 +138,9 @@ class _Line:
         data = bytes(row.data)
         if not data:
             return Row(row.number, row.begin, row.end, row.sender, data, (), "", False, whole)
-        phrase = self._phrases.read(data, row.sender == self._host)
+        if row.sender == self._host:
+            self._asked = data
+        phrase = self._phrases.read(data, row.sender == self._host, self._asked)
         parts = parted(phrase, data, self._text)
         note = f"damaged on the line; {phrase.note}" if row.damaged else phrase.note
         return Row(row.number, row.begin, row.end, row.sender, data, parts, note, phrase.wrong or row.damaged, whole)
@@ -176,10 +179,15 @@ def parted(phrase: Phrase, data: bytes, text: Callable[[bytes], str]) -> tuple[P
     return tuple(parts)
 
 
+def _printed(text: str) -> str:
+    """Blanks alone are a key that was pressed, and are to be seen."""
+    return text if text.strip() else " ".join(["SPACE"] * len(text))
+
+
 def shown(data: bytes) -> str:
     """Bytes as they are shown: printable ones as they are, control characters by name, others in hex."""
     runs = groupby(data, key=lambda value: 0x20 <= value < 0x7F)
     return " ".join(
-        bytes(run).decode() if printable else " ".join(_NAMES.get(value, f"{value:02X}h") for value in run)
+        _printed(bytes(run).decode()) if printable else " ".join(_NAMES.get(value, f"{value:02X}h") for value in run)
         for printable, run in runs
     )

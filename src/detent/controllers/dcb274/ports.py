@@ -4,6 +4,8 @@ An input is active when it is low. Flag 8 of `l` inverts every input but the lim
 will invert all of the inputs", "'l 8' all but the limit switch inputs"). An output that is on pulls its pin to 0.
 """
 
+from typing import Final
+
 from detent.controllers.dcb274 import settings
 from detent.controllers.dcb274.pins import DIRECTION_HOLD, INPUTS, STEP_LOW
 from detent.controllers.dcb274.settings import Settings
@@ -11,6 +13,10 @@ from detent.pins import HIGH, LOW, Level, PinDriver
 from detent.ticks import NEVER, Ns
 
 P4, P5 = 8, 16  # flags of A
+READ_PORTS: Final = 129  # to A: do not set anything, print the ports
+PORTS: Final = ((1, "P1"), (2, "P2"), (4, "P3"), (P4, "P4"), (P5, "P5"))  # weights in what A 129 and ] 0 print
+SWITCHES: Final = ((128, "LIMIT-B"), (64, "LIMIT-A"), (32, "HOME"))  # the others of ] 0
+JOGS: Final = ((128, "JOG-S"), (64, "JOG2"), (32, "JOG1"))  # those of ] 1
 
 
 class Ports:
@@ -74,13 +80,11 @@ class Ports:
 
     def switches(self) -> int:
         """What ``] 0`` prints: Lb La Hm and the five ports."""
-        flags = ((128, "LIMIT-B"), (64, "LIMIT-A"), (32, "HOME"))
-        return self.ports(5) + sum(weight for weight, pin in flags if self.active(pin))
+        return self.ports(5) + sum(weight for weight, pin in SWITCHES if self.active(pin))
 
     def jogs(self) -> int:
         """What ``] 1`` prints: the three jog inputs."""
-        flags = ((128, "JOG-S"), (64, "JOG2"), (32, "JOG1"))
-        return sum(weight for weight, pin in flags if self.active(pin))
+        return sum(weight for weight, pin in JOGS if self.active(pin))
 
     # -- outputs -----------------------------------------------------------------------------------------
 

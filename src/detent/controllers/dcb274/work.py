@@ -12,13 +12,12 @@ from detent.controllers.dcb274.commands import CLEARING, COMMON, ROWS, Instructi
 from detent.controllers.dcb274.current import slow_decay
 from detent.controllers.dcb274.memory import SIZE, Memory
 from detent.controllers.dcb274.motion import Motion, wrapped
-from detent.controllers.dcb274.ports import Ports
+from detent.controllers.dcb274.ports import READ_PORTS, Ports
 from detent.controllers.dcb274.settings import Settings
 from detent.controllers.dcb274.trip import Trip
 from detent.ticks import US, Ns
 
 MODEL_NUMBER: Final = 26  # what X answers in party line (page 52)
-READ_PORTS: Final = 129
 AT_LEAST: Ns = 10 * US  # an instruction without execution times; no loop takes no time
 _INDEXES: Final = (Op.PLUS, Op.MINUS, Op.INDEX_TO, Op.FIND_HOME)
 _SETS_OFF: Final = (*_INDEXES, Op.VELOCITY, Op.GO)

@@ -142,6 +142,7 @@ REPORTS: Final[tuple[Report, ...]] = (
     Report(-11, "stop OK rate"),
 )
 VERSION: Final = -12
+STEP_ACTION: Final = -8  # tells one of `ACTIONS`
 
 ACTIONS: Final = (
     "idle", "ramping up", "at speed", "slowing", "slewing", "quick stop", "reversing", "stopping for a new go",

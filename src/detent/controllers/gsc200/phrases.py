@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from detent.controllers.gsc200 import commands, pins
-from detent.controllers.gsc200.commands import CommandError
+from detent.controllers.gsc200.commands import CommandError, Instruction, Op
 from detent.controllers.gsc200.link import CR, LONGEST, Link
 from detent.controllers.phrase import Phrase, Piece
 from detent.pins import HIGH, Level
@@ -20,6 +20,16 @@ ERRORS: Final = {
 ANSWERS: Final = {"Y": "done, or begun", "B": "busy: not now", "R": "ready"}
 
 
+def verified(text: str, what: int) -> str:
+    """What stands behind V: the position, or user inputs and outputs with the weights 1, 2, 4, as V1 or V2 asked."""
+    if what == 1:
+        return f"position {text}"
+    if what == 2 and len(text) == 2 and text.isdigit():
+        levels = ((kind, int(figure)) for kind, figure in zip(("UI", "UO"), text, strict=True))
+        return ", ".join(f"{kind}{n + 1}={value >> n & 1}" for kind, value in levels for n in range(3))
+    return f"{text}: a position, or inputs and outputs"
+
+
 class Phrases:
     """The frames of one model, on a line as the straps have it."""
 
@@ -32,7 +42,7 @@ class Phrases:
         """At CR."""
         return data[-1] == CR
 
-    def read(self, data: bytes, to_unit: bool) -> Phrase:
+    def read(self, data: bytes, to_unit: bool, asked: bytes = b"") -> Phrase:
         """The frame of a host, or the answer of a module."""
         body, end = (data[:-1], [Piece(1, "end", "CR: end of the frame")]) if data[-1] == CR else (data, [])
         pieces: list[Piece] = []
@@ -49,9 +59,17 @@ class Phrases:
                 fault = fault or f"wrong checksum, {body[-1]:02X}h instead of {wanted[0]:02X}h: E1"
                 check = [Piece(1, "error", fault)]
         said = text.decode("latin-1")
-        found = self._command(said) if to_unit else self._answer(said)
+        found = self._command(said) if to_unit else self._answer(said, self._asked(asked))
         note = fault or found.note
         return Phrase((*pieces, *found.pieces, *check, *end), note, bool(fault) or found.wrong)
+
+    def _asked(self, frame: bytes) -> Instruction | None:
+        """The instruction in the frame of a host; None if there is none."""
+        text = frame[1 if self._addressed else 0 : -2 if self._checksums else -1]
+        try:
+            return commands.parse(self._model, text.decode("latin-1"))
+        except CommandError:
+            return None
 
     def _command(self, text: str) -> Phrase:
         if not text:
@@ -67,15 +85,15 @@ class Phrases:
             pieces.append(Piece(len(text) - len(letters), "argument", row.argument.words))
         return Phrase(tuple(piece for piece in pieces if piece.length), row.help)
 
-    def _answer(self, text: str) -> Phrase:
+    def _answer(self, text: str, asked: Instruction | None) -> Phrase:
         if text in ANSWERS:
             return Phrase((Piece(1, "answer", ANSWERS[text]),), ANSWERS[text])
         if text[:1] == "E" and text[1:] in ERRORS:
             what = ERRORS[text[1:]]
             return Phrase((Piece(2, "error", f"error {text[1:]}: {what}"),), f"{text}: {what}", True)
         if text[:1] == "V" and text[1:]:
-            pieces = Piece(1, "answer", "verified"), Piece(len(text) - 1, "argument", "position, or inputs and outputs")
-            return Phrase(pieces, text[1:])
+            meaning = verified(text[1:], asked.value if asked is not None and asked.op is Op.VERIFY else 0)
+            return Phrase((Piece(1, "answer", "verified"), Piece(len(text) - 1, "argument", meaning)), meaning)
         if text == "END":
             return Phrase((Piece(3, "answer", "end of the program"),), "end of the program")
         what = "an instruction of the program" if text else ""

@@ -13,7 +13,7 @@ class Phrases:
             return len(data) == link.ANSWER_LENGTH
         return len(data) >= commands.SHORTEST and len(data) >= commands.length(data[1])
 
-    def read(self, data: bytes, to_unit: bool) -> Phrase:
+    def read(self, data: bytes, to_unit: bool, asked: bytes = b"") -> Phrase:
         """A message, or an answer."""
         return self._message(data) if to_unit else self._answer(data)
 

@@ -1,7 +1,7 @@
 """What a DCB-274 answers, as values (page numbers as in the manual)."""
 
 import re
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 
 class Settings(NamedTuple):
@@ -41,6 +41,10 @@ _SETTINGS = re.compile(
     r"K= *(?P<up>\d+)/(?P<down>\d+), *I= *(?P<initial>\d+), *V= *(?P<slew>\d+), *D= *(?P<divide>\d+),"
     r"( *b= *(?P<decay>\d+),)?( *(?P<slow>[sf]),)?(?P<resolution>[^,=]+),( *l= *(?P<options>\d+),)? *n=(?P<name>.)"
 )
+
+
+MOVING: Final = {0: "at rest", 1: "indexing or homing", 3: "constant speed or jogging"}
+"""What ^ answers (page 56)."""
 
 
 class Ports(NamedTuple):

@@ -8,6 +8,7 @@ from functools import singledispatch
 from typing import Final, NamedTuple
 
 from detent.hosts.dcb274 import Dcb274
+from detent.hosts.dcb274.answers import MOVING
 from detent.hosts.errors import Busy, MotionFailed, Refused
 from detent.hosts.exchange import Driver, Steps
 from detent.hosts.genstepper import GenStepper
@@ -71,8 +72,6 @@ def _(driver: GsC200) -> Steps[Look]:
 
 # -- DCB-274: lines at rest and in motion, none while a program runs ----------------------------------------------
 
-_MOVES: Final = {0: "at rest", 1: "indexing or homing", 3: "constant speed or jogging"}
-
 
 @look.register
 def _(driver: Dcb274) -> Steps[Look]:
@@ -105,7 +104,7 @@ def _(driver: Dcb274) -> Steps[Look]:
     why = "X tells it at rest" if driver.mode == "single" else "it tells its settings in single mode only"
     settings = ("initial I", "slew V", "divide D", "ramp K", "resolution H", "name")
     found += [Fact(name, values.get(name), "X" if name in values else why) for name in settings]
-    return Look(_MOVES.get(status, f"^ tells {status}"), bool(status & 3), position, None, tuple(found))
+    return Look(MOVING.get(status, f"^ tells {status}"), bool(status & 3), position, None, tuple(found))
 
 
 # -- GenStepper: everything at any time ---------------------------------------------------------------------------

@@ -23,6 +23,7 @@ class Transcript:
         self._text = (lambda data: data.hex(" ").upper()) if numbers else shown
         self._rows: list[Row] = []
         self._first = 0
+        self._asked = b""  # what the host said last
         self._open: dict[str, int] = {}  # sender: number of the row in the making
         self.looking = False
         """Whether what is said now are the questions of a look (`questions`)."""
@@ -74,7 +75,9 @@ class Transcript:
             self._show(self._rows[number - self._first]._replace(whole=True))
 
     def _show(self, row: Row) -> None:
-        phrase = self._phrases.read(row.data, row.sender == HOST)
+        if row.sender == HOST:
+            self._asked = row.data
+        phrase = self._phrases.read(row.data, row.sender == HOST, self._asked)
         parts = parted(phrase, row.data, self._text)
         self._rows[row.number - self._first] = row._replace(parts=parts, note=phrase.note, wrong=phrase.wrong)
 
