@@ -147,16 +147,15 @@ def _curve(curve: str, given: dict[str, float], duration: str | None) -> "tuple[
 def _points(path: Path) -> list[tuple[float, float]]:
     """The lines t,V of a file; a first line of words is a heading. ValueError with the line, OSError."""
     from detent.controllers.catalogue import unknown
+    from detent.realtime.texts import read_text
 
     if "." not in str(path) and not path.exists():
         raise unknown("curve", str(path), ("sine", "linear", "FILE.csv"))
     points: list[tuple[float, float]] = []
     try:
-        lines = list(csv.reader(path.read_text().splitlines()))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot read it: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise ValueError(f"{path}: it is no text file") from None
+        lines = list(csv.reader(read_text(path).splitlines()))
+    except (OSError, csv.Error) as error:
+        raise ValueError(f"{path}: cannot read it: {getattr(error, 'strerror', None) or error}") from None
     for number, row in enumerate(lines, 1):
         if not row or row[0].lstrip().startswith("#"):
             continue

@@ -2,14 +2,29 @@
 
 import errno
 import io
+import os
+import select
+import stat
 from pathlib import Path
+from typing import Final
 
+from detent.realtime.system import NO_WAIT
+
+PIPE: Final = 5.0  # seconds in which something comes through a pipe, or it ends
 MOST_BYTES = 16 * 1024 * 1024
 
 
 def read_whole(path: Path, most: int = MOST_BYTES) -> bytes:
-    """The bytes of a file. Raises OSError, also for one that has more than `most`, or never ends."""
-    with path.open("rb") as file:
+    """The bytes of a file, or of a pipe. Raises OSError, also for one that has more than `most`, or never ends.
+
+    A pipe to which nobody writes is not waited for.
+    """
+    descriptor = os.open(path, os.O_RDONLY | NO_WAIT | getattr(os, "O_BINARY", 0))
+    with os.fdopen(descriptor, "rb") as file:
+        if stat.S_ISFIFO(os.fstat(descriptor).st_mode):
+            if not select.select([descriptor], [], [], PIPE)[0]:
+                raise OSError(errno.EAGAIN, "it is a pipe, and nobody writes to it", str(path))
+            os.set_blocking(descriptor, True)
         data = file.read(most + 1)
     if len(data) > most:
         raise OSError(errno.EFBIG, f"it is larger than {most >> 20} MiB: no file that is meant here is", str(path))

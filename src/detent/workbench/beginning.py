@@ -9,6 +9,7 @@ from detent.cell.description import parse
 from detent.controllers import catalogue
 from detent.realtime.examples import home
 from detent.realtime.images import cell_name
+from detent.realtime.texts import read_text
 from detent.workbench.drafts import Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
@@ -90,7 +91,7 @@ def _cells(root: Path, names: list[str] | None = None) -> list[tuple[str, str]]:
     found = []
     for name in names if names is not None else sorted(str(path.relative_to(root)) for path in root.rglob("*.toml")):
         try:
-            text = (root / name).read_text("utf-8")
+            text = read_text(root / name)
             if "[units" in text:
                 found.append((name, parse(text, name).title or name))
         except (OSError, ValueError):  # a Problem is a ValueError: it is told when it is opened
