@@ -28,7 +28,8 @@ from detent.realtime.boards.link import Link
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.setup import BoardSetup, Pin, StepperSetup
 from detent.realtime.boards.several import Boards
-from detent.realtime.pace import Pace
+from detent.realtime.loop import Loop
+from detent.realtime.pace import Pace, WallNs
 from detent.ticks import MS, SECOND, US, to_fixed
 
 CLOCK = 12_000_000
@@ -36,7 +37,7 @@ MILLION = 1e6
 
 
 def rows() -> list[Row]:
-    return [*compression_rows(), *link_rows(), *drive_rows(), *stop_rows()]
+    return [*compression_rows(), *link_rows(), *drive_rows(), *cell_rows(), *stop_rows()]
 
 
 def _ramps(rate: int) -> Train:
@@ -162,6 +163,92 @@ def drive_rows() -> list[Row]:
             rest = median(resting.commits) / MS
             found.append(Row("a commit at 10 kHz, half of them", often, "ms", "at rest", rest, 0.2))
             found.append(Row("a commit at 10 kHz, 99 % of them", rare, "ms", "at rest", rest, None))
+    return found
+
+
+class _Wire(FakePort):
+    """A fake board that wakes its host with what it says alone, as a real one does; what it takes itself is counted."""
+
+    spent = 0
+
+    def deadline(self) -> WallNs | None:
+        times = [at for at, _ in [*self._to_host][:1]] + [at + 3 * self._delay for at, _ in [*self._to_board][:1]]
+        return min(times, default=None)
+
+    def receive(self, wall: WallNs) -> bytes:
+        began = process_time_ns()
+        data = super().receive(wall)
+        self.spent += process_time_ns() - began
+        return data
+
+    def send(self, data: bytes, wall: WallNs) -> None:
+        began = process_time_ns()
+        super().send(data, wall)
+        self.spent += process_time_ns() - began
+
+
+class _Cell:
+    """A whole cell behind a board, served by its loop in virtual time."""
+
+    def __init__(self, text: str) -> None:
+        self.now, self._until = SECOND, 0
+        fake = FakeBoard(Machine({"x": MachineAxis("gpio2", "gpio3")}), moves=512)
+        fake.kept_log = False
+        self.port = _Wire(fake)
+        real = RealPins(lambda news: None, lambda address: self.port, lambda: self.now, self._sleep)
+        opened = Opened(parse(text, "cell.toml"), str, real)
+        stores = HeldStores(no_store)
+        self.cell = build(parse(text, "cell.toml"), str, store=stores.save, inputs=opened.inputs)
+        self.driven = opened.drive(self.cell, stores)
+        pace = Pace(clock=self.driven.clock)
+        self.loop = Loop(self.driven, pace, [], companion=self.driven, wait=self._wait)
+        opened.begin(self.driven, pace)
+
+    def _sleep(self, _: object, __: object, seconds: float) -> tuple[list[int], list[int]]:
+        self.now += max(round(seconds * SECOND), 10 * US)
+        return [], []
+
+    def _wait(
+        self, _: object, __: object, ___: object, seconds: float | None
+    ) -> tuple[list[int], list[int], list[int]]:
+        left = self._until - self.now
+        self.now += max(10 * US, left if seconds is None else min(round(seconds * SECOND) + 60 * US, left))
+        return [], [], []
+
+    def run(self, span: int) -> float:
+        """Serve for so long: the host's share of a core in percent."""
+        self._until, self.port.spent, began = self.now + span, 0, process_time_ns()
+        while self.now < self._until:
+            self.loop.step()
+        return 100 * (process_time_ns() - began - self.port.spent) / span
+
+    def type(self, line: str) -> None:
+        self.run(200 * MS)
+        self.driven.send(0, self.cell.serial_unit("x").frame(line))
+        self.run(200 * MS)
+
+
+def cell_rows() -> list[Row]:
+    """The share of a core that a whole driven cell takes at 10 kHz, loop, wire and all; the baseline is it at rest."""
+    hardware = (
+        '[boards.b]\nserial = "fake:"\n[hardware.x]\nboard = "b"\nstep = "gpio2"\ndir = "gpio3"\nenable = "gpio4"\n'
+    )
+    cells = {
+        "gs-c200": (hardware + 'outputs = { MOV = "gpio5" }\ninputs = { EOT = "^gpio10", HOME = "^gpio11" }\n',
+                    ("S10", "T1000", "R100", "+200000")),
+        "dcb-274": (hardware + 'inputs = { LIMIT-A = "^gpio10", LIMIT-B = "^gpio11", HOME = "^gpio12" }\n',
+                    (" ", "M 10000")),
+    }  # fmt: skip
+    found = []
+    for model, (text, lines) in cells.items():
+        made = _Cell(f'[units.x]\nmodel = "{model}"\n{text}')
+        idle = made.run(2 * SECOND)
+        for line in lines:
+            made.type(line)
+        made.run(SECOND)
+        share = median(made.run(SECOND) for _ in range(5))
+        found.append(Row(f"a whole {model} cell at 10 kHz", share, "%", "at rest", idle, 15))
+        made.loop.close()
     return found
 
 
