@@ -83,3 +83,12 @@ def test_what_is_refused_says_so_and_leaves_no_trace(kind: str) -> None:
     assert made.recording is not None
     assert again.recording is not None
     assert list(made.recording) == list(again.recording)
+
+
+def test_every_strap_can_be_tied_elsewhere_and_counts_at_the_next_power_on() -> None:
+    made = cell(TEXT)
+    for unit, controller in made.controllers().items():
+        for strap, level in dict(controller.straps).items():
+            made.set_pin(unit, strap, 1 - level)
+            assert controller.straps[strap] == 1 - level, f"{unit}.{strap}"
+            made.set_pin(unit, strap, level)

@@ -364,7 +364,10 @@ class Cell:
         found = find_pin(self.parts[index].pins, pin)
         if found is None:
             raise ValueError(f"{unit} has no pin {pin!r}")
-        if found.kind not in (PinKind.INPUT, PinKind.STRAP):
+        strapped = pin in getattr(
+            self.parts[index], "straps", ()
+        )  # as RXD, which tells a GS-C200 that no host is there
+        if found.kind not in (PinKind.INPUT, PinKind.STRAP) and not strapped:
             raise ValueError(f"{unit}.{pin} is no input ({found.kind.value}): only inputs are given a level")
         return index
 
