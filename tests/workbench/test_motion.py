@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from detent.controllers.catalogue import MODELS
+from detent.motors.drive import Drive
 from detent.motors.motor import MotorError
 from detent.motors.named import motor
 from detent.moves import laws
@@ -22,6 +23,28 @@ def test_a_move_of_a_gsc200_has_the_times_of_its_ramp() -> None:
     assert drawn.ramps[0] == pytest.approx(40 / 550, abs=1e-6)
     assert drawn.duration * 1e-9 == pytest.approx(2 * 40 / 550 + 0.42, abs=1e-6)
     assert drawn.mean == pytest.approx(500 / (drawn.duration * 1e-9))
+
+
+def test_acceleration_is_that_of_the_law() -> None:
+    """(1000**2 - 100**2) / 80 steps/s2 on the way up, none at the slew speed, as much again on the way down."""
+    law = laws.law("gs-c200")
+    at, values = motion.picture(law.train({"S": 10, "T": 100, "R": 40}, 500)).accelerations
+    up, cruise, down = at < 0.07, (at > 0.08) & (at < 0.48), at > 0.5
+    for where, expected in ((up, 12375), (cruise, 0), (down, -12375)):
+        assert values[where] == pytest.approx(expected, abs=20)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("steps", [1, 2, 3, 50, 1234])
+def test_accelerations_are_finite_and_add_up_to_the_speeds(model: str, steps: int) -> None:
+    law = laws.law(model)
+    drawn = motion.picture(law.train(law.values, steps))
+    at, values = drawn.accelerations
+    assert np.isfinite(values).all()
+    assert (np.diff(at) > 0).all()
+    if steps > 1000:
+        gained = np.concatenate(([0], np.cumsum((values[1:] + values[:-1]) / 2 * np.diff(at)))).max()
+        assert gained == pytest.approx(drawn.peak - drawn.speeds[0], rel=0.15)
 
 
 def test_a_move_too_short_for_the_slew_speed_says_so() -> None:
@@ -91,7 +114,7 @@ def test_a_supersigma_is_limited_by_its_command_or_else_by_its_table() -> None:
 def rig(friction: float = 0.0) -> motion.Rig:
     found = motor("qsh4218-41-10-035")
     half = laws.law("gs-c200").windings[0]
-    return motion.rig(found, half, supply=24, current=found.current, inertia=found.rotor, friction=friction)
+    return motion.rig(found, Drive(24, found.current, half), inertia=found.rotor, friction=friction)
 
 
 def test_a_gentle_move_is_followed_and_a_steep_one_is_lost() -> None:
@@ -129,4 +152,4 @@ def test_a_motor_without_rotor_inertia_needs_one_for_the_whole() -> None:
     found = motor("qsh4218-41-10-035").changed(inertia=None)
     half = laws.law("gs-c200").windings[0]
     with pytest.raises(MotorError, match="rotor and load together"):
-        motion.rig(found, half, supply=24, current=1.0, inertia=0.0, friction=0.0)
+        motion.rig(found, Drive(24, 1.0, half), inertia=0.0, friction=0.0)

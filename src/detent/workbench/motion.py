@@ -14,13 +14,12 @@ from detent.motors import engine
 from detent.motors.curve import PullOut, pull_out
 from detent.motors.damping import given, usual
 from detent.motors.diagnosis import Loss, diagnose
-from detent.motors.drive import Decay, Drive
+from detent.motors.drive import Drive
 from detent.motors.load import NO_LOAD, Load
 from detent.motors.motor import Motor, MotorError
 from detent.motors.move import Verdict, simulate
 from detent.motors.rotor import Rig
 from detent.motors.variants import LossRate, loss_rate
-from detent.motors.winding import Winding
 from detent.pulses import Train
 from detent.ticks import Ns
 
@@ -30,7 +29,10 @@ COLUMNS: Final = 480  # points of a picture across
 MOST_PULSES: Final = 2_000_000  # of a move that is judged while somebody waits
 MOST_TIME: Final[Ns] = 120_000_000_000  # likewise
 MOST_VARIED: Final[Ns] = 15_000_000_000  # of a move that is judged with variants, likewise
+MOST_CHANGING: Final[Ns] = 2_000_000_000  # likewise, where the load changes on the way: variants go one by one
 VARIANTS: Final = 256
+ACCELERATIONS: Final = 240  # points of their curve
+FINE, COARSE, SMOOTH = 400, 60, 8  # parts of a move, in each of which it is taken; segments of a train without stairs
 _CURVE: Final = 14  # speeds of a torque curve
 _EDGE: Final = 24  # looks close to each end of a segment, where laws meet
 
@@ -47,6 +49,7 @@ class Picture(NamedTuple):
     steps: int
     duration: Ns
     peak: float  # the highest speed, units/s
+    accelerations: tuple[Floats, Floats]  # times in s, and units/s2 there
     ramps: tuple[float, float]  # s: the end of the way up to the peak, and the begin of the way down
     reached: bool  # whether a part of the move is made at constant speed
 
@@ -80,7 +83,29 @@ def picture(train: Train, columns: int = COLUMNS) -> Picture:
     peak = float(speeds.max())
     top = np.flatnonzero(speeds >= peak * (1 - 1e-6))
     ramps = float(seconds[top[0]]), float(seconds[top[-1]])
-    return Picture(seconds, speeds, positions, steps, duration, peak, ramps, ramps[1] - ramps[0] > 2.5 / peak)
+    return Picture(
+        seconds, speeds, positions, steps, duration, peak, accelerations(train), ramps, ramps[1] - ramps[0] > 2.5 / peak
+    )
+
+
+def accelerations(train: Train) -> tuple[Floats, Floats]:
+    """Times (s) and accelerations (units/s2) of a train that ends: how its mean speed changes, from place to place.
+
+    The speed at which a move starts, and from which it stops, is a step and no acceleration. Counters speed up in
+    stairs, which no rotor follows one by one: a part of the move that has several of them is looked at together.
+    """
+    first, duration = train.time_of(0), train.duration or 0
+    window = duration / (FINE if len(train.segments) <= SMOOTH else COARSE)
+    at = np.linspace(window, duration - window, ACCELERATIONS)
+
+    def places(times: Floats) -> Floats:
+        states = [train.state_at(first + min(max(round(t), 0), duration)) for t in times.tolist()]
+        return np.array([state.steps + state.phase for state in states], np.float64)
+
+    if duration < 1000:  # a step or two: nothing to be seen
+        return np.zeros(0), np.zeros(0)
+    values = (places(at + window) - 2 * places(at) + places(at - window)) / (window * 1e-9) ** 2
+    return at * 1e-9, values
 
 
 # -- what a motor makes of it ----------------------------------------------------------------------------------
@@ -94,21 +119,23 @@ class Demand(NamedTuple):
 
 
 def rig(
-    motor: Motor, winding: Winding, *, supply: float, current: float, inertia: float, friction: float,
-    damping: float | None = None, rest: Load = NO_LOAD, decay: Decay = "fast",
+    motor: Motor, drive: Drive, *, inertia: float, friction: float, damping: float | None = None,
+    rest: Load = NO_LOAD, pull: float = 0.0,
 ) -> Rig:  # fmt: skip
-    """Motor, drive and load: V, A a phase, kg m2 of the load, Nm. MotorError where they do not go together.
+    """Motor, drive and load: kg m2 of the load, Nm. MotorError where they do not go together.
 
-    `rest` is what else hangs on the shaft: its inertia and friction do not count.
+    `rest` is what else hangs on the shaft: its inertia and friction do not count; `pull` (Nm, towards minus) adds to
+    its torque.
     """
     if motor.inertia is None:
         # with the load's inertia as the whole; the maker gives no rotor
         if inertia <= 0:
             raise MotorError(f"the maker of {motor.name} gives no rotor inertia: give one for rotor and load together")
         motor, inertia = motor.changed(inertia=inertia), 0.0
-    load = replace(rest, inertia=inertia, friction=friction)
-    ratio = None if damping is None or damping == usual(decay).ratio else given(damping)
-    return Rig(motor, Drive(supply, current, winding, decay), load, damping=ratio)
+    drive.check(motor)
+    load = replace(rest, inertia=inertia, friction=friction, torque=rest.torque + pull)
+    ratio = None if damping is None or damping == usual(drive.decay).ratio else given(damping)
+    return Rig(motor, drive, load, damping=ratio)
 
 
 class Judgement(NamedTuple):
@@ -130,7 +157,8 @@ def judgement(train: Train, rig: Rig) -> Judgement:
     """What becomes of the whole train. MotorError for a move too long to be waited for."""
     verdict = judged(train, rig)
     loss = diagnose(train, rig) if verdict.lost else None
-    quick = rig.load.is_steady and (train.duration or 0) <= MOST_VARIED and engine.fast()
+    most = MOST_VARIED if rig.load.is_steady else MOST_CHANGING
+    quick = (train.duration or 0) <= most and engine.fast()
     return Judgement(verdict, loss, loss_rate(train, rig, tried=VARIANTS) if quick else None)
 
 

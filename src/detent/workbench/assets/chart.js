@@ -1,8 +1,24 @@
-/* A small chart on a canvas: lines over two linear axes from 0, with their units. Colours come from the style sheet. */
+/* A small chart on a canvas: lines over two linear axes, x from 0, with their units. Units and labels stand above the
+   lines, never on them. Colours come from the style sheet. */
 
 import { niceStep, showNumber } from "./scope_plot.js";
 
-const MARGIN = { left: 58, right: 14, top: 12, bottom: 24 };
+const MARGIN = { left: 58, right: 14, top: 24, bottom: 24 };
+const ROUND = 11; // px: how high type is
+
+/* The size and the colours of a canvas that fills its parent, sharp on every screen, and wiped. */
+export function fitted(canvas, pen) {
+  const ratio = window.devicePixelRatio || 1,
+    { clientWidth: width, clientHeight: height } = canvas.parentElement,
+    style = getComputedStyle(canvas);
+  canvas.width = Math.round(width * ratio);
+  canvas.height = Math.round(height * ratio);
+  canvas.style.width = `${width}px`;
+  canvas.style.height = `${height}px`;
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  return { width, height, colour: (name) => style.getPropertyValue(name).trim() };
+}
 
 export class Chart {
   constructor(canvas) {
@@ -17,8 +33,8 @@ export class Chart {
     this.watcher.disconnect();
   }
 
-  /* Draw `what`: {right, top (ends of the axes), x, y (units), lines: [{points: [[x, y]], colour, width, dash, fill,
-     label, end}]}, or {note}: words in place of a chart. */
+  /* Draw `what`: {right, top, bottom (ends of the axes; bottom is 0 unless given), x, y (units), lines: [{points:
+     [[x, y]], colour, width, dash, fill, label}]}, or {note}: words in place of a chart. */
   draw(what) {
     this.what = what;
     this.paint();
@@ -26,22 +42,13 @@ export class Chart {
 
   paint() {
     const { canvas, pen, what } = this,
-      ratio = window.devicePixelRatio || 1;
-    const { clientWidth: width, clientHeight: height } = canvas.parentElement;
-    if (!width || !height) return;
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-    canvas.style.width = `${width}px`;
-    canvas.style.height = `${height}px`;
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-    pen.clearRect(0, 0, width, height);
-    if (!what) return;
-    const style = getComputedStyle(canvas),
-      colour = (name) => style.getPropertyValue(name).trim();
+      { width, height, colour } = fitted(canvas, pen);
+    if (!width || !height || !what) return;
     const w = width - MARGIN.left - MARGIN.right,
       h = height - MARGIN.top - MARGIN.bottom;
     const x = (value) => MARGIN.left + (value / what.right) * w,
-      y = (value) => MARGIN.top + h - (value / what.top) * h;
+      bottom = what.bottom || 0,
+      y = (value) => MARGIN.top + h - ((value - bottom) / (what.top - bottom)) * h;
     pen.font = `11px ${colour("--mono")}`;
     pen.lineWidth = 1;
     if (what.note) {
@@ -79,24 +86,36 @@ export class Chart {
       pen.setLineDash([]);
     }
     pen.restore();
+    this.legend({ pen, colour, width, lines: what.lines });
+  }
+
+  /* What each line is, above them from the right; what has no room is left out. */
+  legend({ pen, colour, width, lines }) {
     pen.textBaseline = "middle";
-    for (const { points, label, colour: name, end } of what.lines) {
-      if (!label || !points.length) continue;
-      const [a, b] = end ? points.at(-1) : points[Math.floor(points.length * 0.4)];
-      const room = pen.measureText(label).width;
-      pen.fillStyle = colour(name);
-      pen.textAlign = "left";
-      pen.fillText(
-        label,
-        Math.min(Math.max(x(a) + 4, MARGIN.left + 4), width - MARGIN.right - room),
-        Math.max(y(b) - 10, 8),
-      );
+    pen.textAlign = "left";
+    let right = width - MARGIN.right;
+    for (const { label, colour: name, dash } of [...lines].reverse()) {
+      if (!label) continue;
+      const left = right - pen.measureText(label).width;
+      if (left < MARGIN.left + 90) break;
+      pen.fillStyle = colour("--ink-2");
+      pen.fillText(label, left, ROUND);
+      pen.strokeStyle = colour(name);
+      pen.lineWidth = 2;
+      pen.setLineDash(dash || []);
+      pen.beginPath();
+      pen.moveTo(left - 24, ROUND);
+      pen.lineTo(left - 6, ROUND);
+      pen.stroke();
+      pen.setLineDash([]);
+      right = left - 36;
     }
   }
 
   grid({ pen, colour, x, y, w, h, what }) {
     const across = niceStep(what.right / Math.max(w / 86, 2)),
-      up = niceStep(what.top / Math.max(h / 34, 2));
+      bottom = what.bottom || 0,
+      up = niceStep((what.top - bottom) / Math.max(h / 26, 2));
     pen.strokeStyle = colour("--line");
     pen.fillStyle = colour("--ink-2");
     pen.beginPath();
@@ -111,7 +130,7 @@ export class Chart {
     pen.textAlign = "right";
     pen.fillText(what.x, MARGIN.left + w + 8, MARGIN.top + h + 8);
     pen.textBaseline = "middle";
-    for (let k = 0; k * up <= what.top * 1.0001; k++) {
+    for (let k = Math.ceil(bottom / up - 1e-4); k * up <= what.top * 1.0001; k++) {
       const at = Math.round(y(k * up)) + 0.5;
       pen.moveTo(MARGIN.left - 4, at);
       pen.lineTo(MARGIN.left + w, at);
@@ -119,6 +138,6 @@ export class Chart {
     }
     pen.stroke();
     pen.textAlign = "left";
-    pen.fillText(what.y, MARGIN.left + 6, MARGIN.top + 4);
+    pen.fillText(what.y, 8, ROUND);
   }
 }

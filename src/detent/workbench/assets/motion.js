@@ -1,175 +1,206 @@
-/* The Motion page: sliders, the picture of the move, the motor's torque. Every number comes from the server
-   (detent/workbench/moves.py); nothing is sent to the unit but by its keys. */
+/* The Motion page: sliders, the picture of the move, A beside it, the motor's torque and its verdict. Every number comes
+   from the server (detent/workbench/moves.py); nothing is sent to the unit but by its keys. */
 
 import { Chart } from "./chart.js";
+import { exported } from "./motion_export.js";
+import { MotorForm } from "./motion_form.js";
+import { Sending } from "./motion_sending.js";
+import { sliders } from "./motion_sliders.js";
+import { Tuning } from "./motion_tuning.js";
 import { element } from "./scope_tools.js";
 import { showNumber, showSpan } from "./scope_plot.js";
 
 const MOVE_AFTER = 25,
   JUDGE_AFTER = 180; // ms behind the last change
-const NOTCHES = 1000; // of a slider
-const WIDE = 50; // from so many times the least on, a slider counts in proportions
+const CHARTS = ["speed", "acceleration", "place", "torque"];
 
 class Motion {
   constructor(root) {
     this.root = root;
     this.find = (selector) => root.querySelector(selector);
     this.charts = Object.fromEntries(
-      ["speed", "place", "torque"].map((name) => [name, new Chart(this.find(`.motion-chart.${name} canvas`))]),
+      CHARTS.map((name) => [name, new Chart(this.find(`.motion-chart.${name} canvas`))]),
     );
-    this.form = this.find(".motion-form");
+    this.form = new MotorForm(root, () => this.judgeLater());
+    this.sending = new Sending(root, this);
+    this.tuning = new Tuning(root, this);
     this.number = 0;
-    for (const tab of root.querySelectorAll("[data-unit]")) tab.addEventListener("click", () => this.show(tab));
-    for (const key of root.querySelectorAll("[data-key]"))
-      key.addEventListener("click", () => this.actions[key.dataset.key]());
-    this.form.addEventListener("input", (event) => this.formChanged(event.target.name));
-    this.form.addEventListener("submit", (event) => event.preventDefault());
-    this.unTheme = detent.onTheme(() => Object.values(this.charts).forEach((chart) => chart.paint()));
-    const tabs = [...root.querySelectorAll("[data-unit]")],
-      last = detent.remembered("motion.axis");
-    const first = tabs.find((tab) => `${tab.dataset.unit}.${tab.dataset.axis}` === last) || tabs[0];
-    if (first) this.show(first);
+    this.kept = null; // the move that is A
+    this.root.addEventListener("click", (event) => {
+      const tab = event.target.closest("[role=tab]"),
+        key = event.target.closest("[data-key]");
+      if (tab) this.show(tab);
+      else if (key && this.deeds[key.dataset.key]) this.deeds[key.dataset.key]();
+    });
+    this.find(".motion-of").addEventListener("click", (event) => {
+      event.preventDefault();
+      this.find("#motion-motor").scrollIntoView({ block: "center" });
+      this.find("select[name=motor]").focus();
+    });
+    for (const role of ["measure", "lead"])
+      this.find(`[data-role=${role}]`).addEventListener("change", () => this.measured());
+    this.ends = [
+      detent.onTheme(() => Object.values(this.charts).forEach((chart) => chart.paint())),
+      detent.on("r.names", (key, names) => key === "r.names" && this.realTabs(names || [])),
+    ];
+    this.begin();
   }
 
   close() {
     this.closed = true;
     for (const chart of Object.values(this.charts)) chart.close();
-    if (typeof this.unTheme === "function") this.unTheme();
+    this.tuning.close();
+    for (const end of this.ends) if (typeof end === "function") end();
   }
 
-  async show(tab) {
-    const { unit, axis } = tab.dataset,
-      about = await this.ask("motion_about", unit, axis);
-    if (!about || this.closed) return;
+  /* -- which axis ----------------------------------------------------------------------------------------------- */
+
+  get tabs() {
+    return [...this.root.querySelectorAll("[role=tab]")];
+  }
+
+  begin() {
+    const last = detent.remembered("motion.axis");
+    const first = this.tabs.find((tab) => nameOf(tab.dataset) === last) || this.tabs[0];
+    if (first) this.show(first);
+  }
+
+  /* The units that are connected stand behind those of the cell. */
+  realTabs(names) {
+    const there = this.tabs.filter((tab) => tab.dataset.real);
+    for (const tab of there) if (!names.includes(tab.dataset.unit)) tab.remove();
+    for (const name of names)
+      if (!there.some((tab) => tab.dataset.unit === name))
+        this.find(".motion-units").append(
+          element(
+            "button",
+            {
+              type: "button",
+              role: "tab",
+              class: "key small",
+              "data-unit": name,
+              "data-axis": "",
+              "data-real": "yes",
+              "aria-selected": "false",
+              "data-help": "A unit that is connected on the Unit page",
+            },
+            name,
+          ),
+        );
+    if (this.about && this.about.real && !names.includes(this.about.unit) && this.tabs[0]) this.show(this.tabs[0]);
+  }
+
+  async show(tab, options = {}) {
+    const { unit, axis, real } = tab.dataset;
+    const about = await this.ask("motion_about", { unit, axis, real: Boolean(real), options });
+    if (!about || this.closed) return false;
+    const other = !this.about || nameOf(this.about) !== nameOf(about);
     this.about = about;
-    detent.remember("motion.axis", `${unit}.${axis}`);
-    for (const other of this.root.querySelectorAll("[data-unit]")) other.setAttribute("aria-selected", other === tab);
+    this.options = options;
+    this.tab = tab;
+    detent.remember("motion.axis", nameOf(about));
+    for (const one of this.tabs) one.setAttribute("aria-selected", one === tab);
     this.find(".motion-law").textContent = about.law;
+    this.find(".motion-told").textContent = "";
     this.values = { ...about.values };
-    this.steps = about.steps;
+    this.takeMeasure();
+    if (other) {
+      this.steps = about.steps;
+      this.kept = null;
+      this.form.fill(about);
+      this.tuning.moved();
+    } else this.form.steppings(about);
     this.sliders();
-    this.fillForm();
     this.changed();
+    return true;
   }
 
-  /* -- sliders ------------------------------------------------------------------------------------------------ */
+  get place() {
+    const { unit, axis, real } = this.about;
+    return { unit, axis, real, options: this.options };
+  }
+
+  get wanted() {
+    return { ...this.place, values: this.values, steps: this.steps };
+  }
 
   sliders() {
-    const { settings, most, units } = this.about;
-    const rows = [
-      ...settings.map((setting) => ({
-        ...setting,
-        get: () => this.values[setting.name],
-        set: (value) => {
-          this.values[setting.name] = value;
-        },
-      })),
-      {
-        name: "steps",
-        title: "move length",
-        unit: units,
-        low: 1,
-        high: most,
-        scale: 1,
-        get: () => this.steps,
-        set: (value) => {
-          this.steps = value;
-        },
+    this.rows = sliders(this.about, {
+      values: this.values,
+      steps: () => this.steps,
+      move: (steps) => {
+        this.steps = steps;
       },
-    ];
-    this.rows = rows.map((row) => this.slider(row));
+      changed: () => this.changed(),
+    });
     this.find(".motion-sliders").replaceChildren(...this.rows.map((row) => row.place));
   }
 
-  slider(row) {
-    const wide = row.high / Math.max(row.low, 1) > WIDE,
-      shift = row.low < 1 ? 1 : 0;
-    const notch = (value) =>
-      wide
-        ? (NOTCHES * Math.log((value + shift) / (row.low + shift))) / Math.log((row.high + shift) / (row.low + shift))
-        : (NOTCHES * (value - row.low)) / Math.max(row.high - row.low, 1);
-    const value = (at) => {
-      const exact = wide
-        ? (row.low + shift) * ((row.high + shift) / (row.low + shift)) ** (at / NOTCHES) - shift
-        : row.low + (at / NOTCHES) * (row.high - row.low);
-      const size = wide ? 10 ** Math.max(Math.floor(Math.log10(Math.max(exact, 1))) - 1, 0) : 1; // two figures will do
-      return Math.min(Math.max(Math.round(exact / size) * size, row.low), row.high);
-    };
-    const range = element("input", {
-      type: "range",
-      min: 0,
-      max: NOTCHES,
-      step: 1,
-      "aria-label": row.title,
-      "data-setting": row.name,
-    });
-    const exact = element("input", {
-      type: "number",
-      class: "field mono",
-      min: row.low * row.scale,
-      max: row.high * row.scale,
-      step: row.scale,
-      "aria-label": `${row.title}, ${row.unit}`,
-      "data-exact": row.name,
-    });
-    const limit = element("small", { class: "motion-limit", role: "status" });
-    const show = () => {
-      limit.textContent = "";
-      range.value = notch(row.get());
-      if (document.activeElement !== exact) exact.value = row.get() * row.scale;
-      range.setAttribute("aria-valuetext", `${row.get() * row.scale} ${row.unit}`);
-    };
-    range.addEventListener("input", () => {
-      limit.textContent = "";
-      row.set(value(Number(range.value)));
-      exact.value = row.get() * row.scale;
-      this.changed();
-    });
-    range.addEventListener("keydown", (event) => {
-      // one count at a time
-      const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
-      if (!by) return;
-      event.preventDefault();
-      row.set(Math.min(Math.max(row.get() + by, row.low), row.high));
-      show();
-      this.changed();
-    });
-    exact.addEventListener("input", () => {
-      const wanted = Math.round(Number(exact.value) / row.scale);
-      if (!exact.value || !Number.isFinite(wanted)) return;
-      row.set(Math.min(Math.max(wanted, row.low), row.high));
-      limit.textContent =
-        row.get() === wanted
-          ? ""
-          : `takes ${row.low * row.scale} to ${row.high * row.scale} ${row.unit}: ${row.get() * row.scale} is meant`;
-      range.value = notch(row.get());
-      this.changed();
-    });
-    exact.addEventListener("change", () => {
-      exact.value = row.get() * row.scale;
-    });
-    const place = element(
-      "div",
-      { class: "motion-slider" },
-      element(
-        "span",
-        { class: "motion-name" },
-        element("b", { class: "mono" }, row.name === "steps" ? "" : row.name.split(" ")[0]),
-        ` ${row.title}`,
-      ),
-      element("span", { class: "motion-exact" }, exact, element("small", {}, row.unit)),
-      range,
-      limit,
-    );
-    show();
-    return { ...row, place, show };
+  /* Settings that were found or picked: into the sliders, with the options that they need. */
+  async take({ settings, options, part }) {
+    const steps = Math.max(Math.round((this.steps * part[0]) / part[1]), 1);
+    const sized = options.table !== undefined || part[0] !== part[1] ? options : this.options;
+    if (!(await this.show(this.tab, sized))) return;
+    Object.assign(this.values, settings);
+    this.steps = Math.min(steps, this.about.most);
+    for (const row of this.rows) row.show();
+    this.changed();
+  }
+
+  /* -- mm, degrees ---------------------------------------------------------------------------------------------- */
+
+  get leadName() {
+    return `lead.${this.about.real ? this.about.unit : `${this.about.unit}.${this.about.axis}`}`;
+  }
+
+  takeMeasure() {
+    let kept = null;
+    try {
+      kept = JSON.parse(detent.remembered(this.leadName) || "null");
+    } catch {
+      /* then it is asked again */
+    }
+    const travel = this.about.fitted && this.about.fitted.travel;
+    if (!kept && travel) kept = ["mm", +(this.perTurn(this.about.fitted.steps) / travel).toPrecision(9)];
+    this.find("[data-role=measure]").value = kept ? kept[0] : "";
+    this.find("[data-role=lead]").value = kept ? kept[1] : "";
+    this.showMeasure();
+  }
+
+  perTurn(steps) {
+    return steps * (this.about.per_step[this.form.stepping] || 1);
+  }
+
+  /* Another measure: what a turn is, is known of the motor, and of what it moves. */
+  measured() {
+    const measure = this.find("[data-role=measure]").value,
+      lead = this.find("[data-role=lead]"),
+      turn = this.judged && this.judged.turn,
+      travel = this.judged && this.judged.travel;
+    if (measure !== this.measure) {
+      const known = measure === "deg" ? this.perTurn(turn || 200) / 360 : travel ? this.perTurn(turn) / travel : 1;
+      lead.value = +known.toPrecision(9);
+    }
+    detent.remember(this.leadName, JSON.stringify(measure ? [measure, Number(lead.value)] : null));
+    this.showMeasure();
+    this.paint();
+  }
+
+  showMeasure() {
+    this.measure = this.find("[data-role=measure]").value;
+    this.find("[data-role=lead-label]").hidden = !this.measure;
+    this.find("[data-role=lead-unit]").textContent = this.measure;
+  }
+
+  /* How lengths are shown: by what they are divided, and their unit. */
+  get scale() {
+    const steps = Number(this.find("[data-role=lead]").value);
+    return this.measure && steps > 0
+      ? { by: steps, unit: this.measure }
+      : { by: 1, unit: this.about.units };
   }
 
   /* -- the picture ---------------------------------------------------------------------------------------------- */
-
-  get wanted() {
-    return { unit: this.about.unit, axis: this.about.axis, values: this.values, steps: this.steps };
-  }
 
   changed() {
     clearTimeout(this.moveSoon);
@@ -182,86 +213,129 @@ class Motion {
       move = await this.ask("motion_move", this.wanted);
     if (!move || this.closed || number !== this.number) return;
     this.move = move;
-    const { units } = this.about,
-      seconds = move.duration * 1e-9,
+    this.paint();
+    const more = Object.entries(this.options).map(([name, value]) => `option ${name} = "${value}"`);
+    this.find(".motion-lines").replaceChildren(
+      ...[...move.settings, move.go, ...more].map((line) => element("span", {}, line)),
+    );
+    const burnt = "table" in this.options;
+    this.find("[data-key=send]").disabled = !move.settings.length || burnt;
+    this.find("[data-key=move]").disabled = burnt;
+    if (burnt)
+      this.find(".motion-told").textContent =
+        "This table is no command: it is burnt into the drive's EPROM, or stands in the cell file as option table.";
+    this.root.dataset.drawn = number;
+  }
+
+  /* The move, and A behind it, over one time. */
+  paint() {
+    const { move, kept } = this;
+    if (!move) return;
+    const { by, unit: units } = this.scale,
+      both = kept ? [kept.move, move] : [move],
+      seconds = Math.max(...both.map((one) => one.duration)) * 1e-9,
       small = seconds < 0.5,
-      unit = small ? "ms" : "s",
-      scale = small ? 1e3 : 1;
-    const over = (values) => move.times.map((t, i) => [t * scale, values[i]]);
-    const speeds = [[0, 0], ...over(move.speeds), [seconds * scale, 0]];
-    const right = seconds * scale * 1.02;
+      x = small ? "ms" : "s",
+      t = small ? 1e3 : 1,
+      right = seconds * t * 1.02;
+    const lines = (points, colour) => [
+      ...(kept ? [{ points: points(kept.move), colour: "--ink-3", dash: [6, 4], width: 1.5, label: "A" }] : []),
+      { points: points(move), colour, fill: !kept, label: kept ? "this move" : "" },
+    ];
+    const top = (of) => Math.max(...both.map(of)) || 1;
     this.charts.speed.draw({
       right,
-      top: move.peak * 1.12,
-      x: unit,
+      top: (top((one) => one.peak) / by) * 1.12,
+      x,
       y: `${units}/s`,
-      lines: [{ points: speeds, colour: "--trace-1", fill: true }],
+      lines: lines(
+        (one) => [
+          [0, 0],
+          ...one.times.map((at, i) => [at * t, one.speeds[i] / by]),
+          [one.duration * 1e-9 * t, 0],
+        ],
+        "--trace-1",
+      ),
+    });
+    const most = top((one) => Math.max(0, ...one.accelerations.map(([, a]) => a))) / by,
+      least = Math.min(0, ...both.map((one) => Math.min(0, ...one.accelerations.map(([, a]) => a)))) / by;
+    this.charts.acceleration.draw({
+      right,
+      top: most * 1.12,
+      bottom: least * 1.12,
+      x,
+      y: `${units}/s\u00b2`,
+      lines: lines((one) => one.accelerations.map(([at, a]) => [at * t, a / by]), "--trace-4"),
     });
     this.charts.place.draw({
       right,
-      top: move.steps * 1.08,
-      x: unit,
+      top: (top((one) => one.steps) / by) * 1.08,
+      x,
       y: units,
-      lines: [{ points: over(move.positions), colour: "--trace-2" }],
+      lines: lines((one) => one.times.map((at, i) => [at * t, one.positions[i] / by]), "--trace-2"),
     });
+    this.facts(most);
+    this.both();
+  }
+
+  facts(most) {
+    const { move } = this,
+      { by, unit: units } = this.scale;
+    const speed = (value, figures) => `${showNumber(+(value / by).toPrecision(figures))} ${units}/s`;
     const facts = {
       duration: showSpan(move.duration),
-      peak: `${showNumber(+move.peak.toPrecision(6))} ${units}/s`,
-      mean: `${showNumber(+move.mean.toPrecision(5))} ${units}/s`,
+      peak: speed(move.peak, 6),
+      mean: speed(move.mean, 5),
+      accelerates: `${showNumber(+most.toPrecision(4))} ${units}/s\u00b2`,
       up: showSpan(move.up * 1e9),
       down: showSpan(move.down * 1e9),
     };
     for (const [name, text] of Object.entries(facts)) this.find(`[data-fact=${name}]`).textContent = text;
-    this.find("[data-fact=peak]").title = move.reached ? "" : "the move is too short for the slew speed";
-    this.find("[data-fact=peak]").classList.toggle("short", !move.reached);
-    this.find(".motion-lines").replaceChildren(...[...move.settings, move.go].map((line) => element("span", {}, line)));
-    this.find("[data-key=send]").disabled = !move.settings.length;
-    this.root.dataset.drawn = number;
+    const peak = this.find("[data-fact=peak]");
+    peak.title = move.reached ? "" : "the move is too short for the slew speed";
+    if (!move.reached) peak.textContent += " (too short for the slew speed)";
+    peak.classList.toggle("short", !move.reached);
+  }
+
+  /* A and this move, row by row. */
+  both() {
+    const table = this.find(".motion-both"),
+      { kept, move } = this;
+    for (const key of ["swap", "drop"]) this.find(`[data-key=${key}]`).hidden = !kept;
+    table.hidden = !kept;
+    if (!kept) return;
+    const speed = (one) => `${showNumber(+(one.peak / this.scale.by).toPrecision(5))} ${this.scale.unit}/s`;
+    const row = (name, one, verdict, more = "") =>
+      element(
+        "tr",
+        {},
+        element("th", { scope: "row" }, name),
+        element("td", {}, [...one.settings, one.go].join(" ")),
+        element("td", {}, showSpan(one.duration), more && element("b", {}, more)),
+        element("td", {}, speed(one)),
+        element("td", { "data-kind": verdict.kind }, verdict.text || "not judged"),
+      );
+    const part = 100 * (move.duration / kept.move.duration - 1);
+    const heads = ["", "commands", "takes", "peak", "motor"].map((text) => element("th", { scope: "col" }, text));
+    table.replaceChildren(
+      table.caption || element("caption", {}, "A and this move"),
+      element("thead", {}, element("tr", {}, ...heads)),
+      element(
+        "tbody",
+        {},
+        row("A", kept.move, kept.verdict),
+        row("this", move, this.said || {}, ` ${part >= 0 ? "+" : "\u2212"}${Math.abs(part).toFixed(1)} %`),
+      ),
+    );
   }
 
   /* -- the motor --------------------------------------------------------------------------------------------------- */
 
-  fillForm() {
-    const { motors, fitted, steppings } = this.about,
-      { motor, stepping } = this.form.elements;
-    motor.replaceChildren(
-      ...(fitted
-        ? [element("option", { value: "fitted" }, `${fitted.name} (${fitted.motor}, in the cell)`)]
-        : [element("option", { value: "" }, "none")]),
-      ...motors.map(({ name, title }) => element("option", { value: name, title }, name)),
-    );
-    stepping.replaceChildren(...steppings.map((name) => element("option", { value: name }, name)));
-    const kept = detent.remembered("motion.motor") || "";
-    motor.value = fitted ? "fitted" : motors.some(({ name }) => name === kept) ? kept : "";
-    this.takeMotor();
-  }
-
-  takeMotor() {
-    const { motor, stepping, supply, current, inertia, friction, damping } = this.form.elements,
-      { fitted, motors } = this.about;
-    const found = motor.value === "fitted" ? fitted : motors.find(({ name }) => name === motor.value);
-    for (const field of [stepping, supply, current, inertia, friction, damping]) field.disabled = !found;
-    if (!found) return;
-    stepping.value = found.stepping || this.about.stepping;
-    supply.value = found.supply;
-    current.value = found.current;
-    inertia.value = +found.inertia.toPrecision(4);
-    friction.value = found.friction || 0;
-    damping.value = found.damping;
-  }
-
-  formChanged(name) {
-    if (name === "motor") {
-      detent.remember("motion.motor", this.form.elements.motor.value);
-      this.takeMotor();
-    }
-    this.judgeLater();
-  }
-
   judgeLater() {
     clearTimeout(this.judgeSoon);
-    const { motor } = this.form.elements;
-    if (!motor.value) {
+    const asked = this.form.asked();
+    if (!asked) {
+      this.judged = null;
       this.verdict("", "");
       this.find(".motion-words").textContent = "";
       this.charts.torque.draw({ note: "Choose a motor for its torque and a verdict." });
@@ -275,22 +349,14 @@ class Motion {
       this.again = true;
       return;
     }
-    const { motor, stepping, supply, current, inertia, friction, damping } = this.form.elements,
-      { fitted, units } = this.about;
-    const numbers = Object.fromEntries(
-      Object.entries({ supply, current, inertia, friction, damping }).map(([name, field]) => [name, Number(field.value)]),
-    );
+    const { torque } = this.charts;
     this.judging = true;
-    if (!this.charts.torque.what || this.charts.torque.what.note) this.charts.torque.draw({ note: "Computing \u2026" });
+    if (!torque.what || torque.what.note) torque.draw({ note: "Computing \u2026" });
     this.root.toggleAttribute("data-judging", true);
     let found = null,
       words = "";
     try {
-      found = await detent.call("motion_motor", this.wanted, {
-        motor: motor.value === "fitted" ? fitted.motor : motor.value,
-        stepping: stepping.value,
-        ...numbers,
-      });
+      found = await detent.call("motion_motor", this.wanted, this.form.asked());
     } catch (error) {
       words = error.message;
     }
@@ -302,60 +368,85 @@ class Motion {
       return;
     }
     this.root.toggleAttribute("data-judging", false);
+    this.judged = found;
     this.find(".motion-words").textContent = found ? found.words : words;
     if (!found) {
-      this.verdict("", "");
-      this.charts.torque.draw({ note: "This motor cannot be judged so." });
+      this.verdict("cannot be judged so", "bad");
+      torque.draw({ note: "This motor cannot be judged so." });
       return;
     }
-    const curve = found.curve.map(([speed, torque]) => [speed, Math.max(torque, 0)]);
-    const top = 1.15 * Math.max(...curve.map(([, torque]) => torque), ...found.asked.map(([, torque]) => torque));
-    const right = Math.max(curve.at(-1)[0], found.asked.at(-1)[0] * 1.1);
-    this.charts.torque.draw({
-      right,
-      top,
-      x: `${units}/s`,
-      y: "Nm",
-      lines: [
-        { points: [[0, curve[0][1]], ...curve], colour: "--trace-3", fill: true, label: "the motor gives" },
-        { points: found.asked, colour: "--trace-2", width: 2.5, label: "the move asks", end: true },
-      ],
-    });
+    this.paintTorque();
     const { verdict } = found;
     if (!verdict) this.verdict("", "");
     else if (verdict.lost) this.verdict("steps lost", "bad");
     else if (verdict.often) this.verdict(`no step lost, but by ${verdict.often} of ${verdict.of} variants`, "bad");
     else if (verdict.of) this.verdict(`no step lost, by none of ${verdict.of} variants`, "good");
     else this.verdict("no step lost", "good");
+    if (this.move) this.both();
+  }
+
+  paintTorque() {
+    const { judged: found, kept } = this,
+      positive = (points) => points.map(([speed, torque]) => [speed, Math.max(torque, 0)]);
+    const curve = positive(found.curve),
+      before = kept && kept.judged ? kept.judged.asked : [];
+    const all = [...curve, ...found.asked, ...before];
+    this.charts.torque.draw({
+      right: Math.max(...all.map(([speed]) => speed)) * 1.02,
+      top: 1.15 * Math.max(...all.map(([, torque]) => torque)),
+      x: `${this.about.units}/s`,
+      y: "Nm",
+      lines: [
+        { points: [[0, curve[0][1]], ...curve], colour: "--trace-3", fill: true, label: "the motor gives" },
+        { points: before, colour: "--ink-3", dash: [6, 4], label: before.length ? "A asks" : "" },
+        { points: found.asked, colour: "--trace-2", width: 2.5, label: "the move asks" },
+      ],
+    });
   }
 
   verdict(text, kind) {
     const place = this.find(".motion-verdict");
+    this.said = { text, kind };
     place.textContent = text;
     place.dataset.kind = kind;
+    this.find(".motion-of").textContent = this.form.title;
   }
 
   /* -- keys ---------------------------------------------------------------------------------------------------- */
 
-  get actions() {
-    const tell = (text) => {
-      this.find(".motion-told").textContent = text;
-    };
-    const send = async (lines) => {
-      for (const line of lines) if ((await this.ask("type", this.about.unit, line)) === undefined) return;
-      tell(`sent: ${lines.join(", ")}; the answers are on the Terminal page`);
-    };
+  get deeds() {
     return {
-      send: () => send(this.move.settings),
-      move: () => send([...this.move.settings, this.move.go]),
-      now: async () => {
-        const about = await this.ask("motion_about", this.about.unit, this.about.axis);
-        if (!about) return;
-        this.values = { ...about.values };
+      send: () => this.sending.settings(this.move.settings),
+      move: () => this.sending.move([...this.move.settings, this.move.go]),
+      now: () => this.show(this.tab),
+      keep: () => {
+        this.kept = this.current();
+        this.paint();
+        if (this.judged) this.paintTorque();
+      },
+      swap: async () => {
+        const back = this.kept;
+        this.kept = this.current();
+        if (!(await this.show(this.tab, back.options))) return;
+        Object.assign(this.values, back.values);
+        this.steps = back.steps;
         for (const row of this.rows) row.show();
         this.changed();
       },
+      drop: () => {
+        this.kept = null;
+        this.paint();
+        if (this.judged) this.paintTorque();
+      },
+      csv: () => exported(this, "csv"),
+      png: () => exported(this, "png"),
+      ...this.tuning.deeds,
     };
+  }
+
+  current() {
+    const { move, judged, said, steps } = this;
+    return { move, judged, verdict: said || {}, values: { ...this.values }, options: { ...this.options }, steps };
   }
 
   async ask(name, ...values) {
@@ -366,6 +457,10 @@ class Motion {
       return undefined;
     }
   }
+}
+
+function nameOf({ unit, axis, real }) {
+  return `${real ? "r:" : ""}${unit}.${axis}`;
 }
 
 detent.part("motion", (root) => {

@@ -153,8 +153,9 @@ class Unit:
         seen = self.seen
         manual = self.manual
         return {
-            "model": self.model, "address": self.address, "options": self.written, "lost": self.tap.lost,
-            "trouble": self.trouble, "state": seen.state if seen else None, "moving": seen.moving if seen else None,
+            "model": self.model, "axis": getattr(self.shell.driver, "motor", ""), "address": self.address,
+            "options": self.written, "lost": self.tap.lost, "trouble": self.trouble,
+            "state": seen.state if seen else None, "moving": seen.moving if seen else None,
             "position": seen.position if seen else None, "last": self.last, "rate": seen.rate if seen else None,
             "facts": [list(fact) for fact in seen.facts] if seen else [], "paused": self.paused, "asking": self.rate,
             "took": round(self.took, 4), "job": self.job, "progress": list(self.progress), "outcome": self.outcome,

@@ -1,0 +1,71 @@
+/* What goes to the unit, from the Motion page: typed to the unit of the cell, or said to one that is connected. For
+   that, and for what was found by a search, the lines are shown first. */
+
+import { element } from "./scope_tools.js";
+
+export class Sending {
+  constructor(root, motion) {
+    this.motion = motion;
+    this.told = root.querySelector(".motion-told");
+    this.dialog = root.querySelector(".motion-dialog");
+    this.dialog.addEventListener("click", (event) => {
+      const key = event.target.closest("button");
+      if (key) this.dialog.close(key.value);
+    });
+    this.dialog.addEventListener("close", () => {
+      const { agreed } = this;
+      this.agreed = null;
+      if (agreed) agreed(this.dialog.returnValue === "send");
+    });
+  }
+
+  get real() {
+    return this.motion.about.real;
+  }
+
+  async settings(lines) {
+    if (this.real && !(await this.shown(lines))) return;
+    await this.send(lines);
+  }
+
+  async move(lines) {
+    if (this.real && !(await this.shown(lines, "The motor moves."))) return;
+    await this.send(lines);
+  }
+
+  /* Show the lines with what is to be known of them; whether they shall be sent. */
+  shown(lines, words = "") {
+    const { dialog } = this,
+      { unit, model } = this.motion.about;
+    dialog.querySelector("h2").textContent = `To ${unit}${this.real ? ", a real unit" : ", in the cell"} (${model})`;
+    dialog.querySelector("p").textContent = words;
+    dialog.querySelector("ol").replaceChildren(...lines.map((line) => element("li", {}, line)));
+    dialog.returnValue = "";
+    dialog.showModal();
+    dialog.querySelector("[value=cancel]").focus();
+    return new Promise((agreed) => {
+      this.agreed = agreed;
+    });
+  }
+
+  /* Line by line; nothing follows a line that is refused. */
+  async send(lines) {
+    const { unit } = this.motion.about,
+      sent = [];
+    for (const line of lines) {
+      if (this.real) {
+        const said = await this.motion.ask("unit_say", unit, line);
+        if (!said) return this.tell(sent, line, "was not sent");
+        if (said.refused) return this.tell(sent, line, `was refused: ${said.meaning || said.answers.join(" ")}`);
+      } else if ((await this.motion.ask("type", unit, line)) === undefined) return this.tell(sent, line, "was not sent");
+      sent.push(line);
+    }
+    this.told.textContent = `sent: ${sent.join(", ")}; the answers are on the ${this.real ? "Unit" : "Terminal"} page`;
+    return true;
+  }
+
+  tell(sent, line, what) {
+    this.told.textContent = `${line} ${what}; ${sent.length ? `sent before it: ${sent.join(", ")}` : "nothing was sent before it"}`;
+    return false;
+  }
+}
