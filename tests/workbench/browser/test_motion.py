@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.workbench.browser.windows import EVERY_LOOK, LOOKS, PHONE, PICTURES, Served, Window, Windows, begun
+from tests.workbench.browser.windows import EVERY_LOOK, LOOKS, PHONE, Served, Window, Windows, begun
 
 CLOSED_LOOP = str(Path(__file__).parents[3] / "examples" / "closed-loop-motor" / "cell.toml")  # a motor is fitted
 
@@ -176,7 +176,9 @@ def test_the_curves_are_kept_as_a_table_and_as_a_picture(motion: Window, tmp_pat
 LITTLE = "inertia=0.1, voltage=0.05, torque_constant=0, inductance=0, resistance=0, damping=0"
 
 
-@pytest.mark.parametrize(("size", "theme"), EVERY_LOOK[:: 1 if PICTURES else 3])
+@pytest.mark.parametrize(
+    ("size", "theme"), [EVERY_LOOK[0], *(pytest.param(*look, marks=pytest.mark.slow) for look in EVERY_LOOK[1:])]
+)
 def test_the_fastest_settings_are_searched_picked_and_sent_by_keys_alone(
     windows: Windows, workbench: Served, size: tuple[int, int], theme: str
 ) -> None:

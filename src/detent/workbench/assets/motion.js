@@ -299,10 +299,11 @@ class Motion {
 
   /* A and this move, row by row. */
   both() {
-    const table = this.find(".motion-both"),
+    const place = this.find(".motion-both"),
+      table = place.firstElementChild,
       { kept, move } = this;
     for (const key of ["swap", "drop"]) this.find(`[data-key=${key}]`).hidden = !kept;
-    table.hidden = !kept;
+    place.hidden = !kept;
     if (!kept) return;
     const speed = (one) => `${showNumber(+(one.peak / this.scale.by).toPrecision(5))} ${this.scale.unit}/s`;
     const row = (name, one, verdict, more = "") =>
@@ -318,7 +319,6 @@ class Motion {
     const part = 100 * (move.duration / kept.move.duration - 1);
     const heads = ["", "commands", "takes", "peak", "motor"].map((text) => element("th", { scope: "col" }, text));
     table.replaceChildren(
-      table.caption || element("caption", {}, "A and this move"),
       element("thead", {}, element("tr", {}, ...heads)),
       element(
         "tbody",

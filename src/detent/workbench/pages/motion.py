@@ -97,7 +97,8 @@ def _page(tabs: str) -> str:
     <p class="motion-judged"><a href="#motion-motor" class="motion-of"></a>
       <b class="motion-verdict" role="status"></b></p>
     <dl class="motion-facts">{facts}</dl>
-    <table class="motion-both mono" hidden><caption>A and this move</caption></table>
+    <div class="motion-both" tabindex="0" role="region" aria-label="A and this move" hidden>
+      <table class="mono"></table></div>
     {charts}
     <div class="motion-keys-row row">{keep}{swap}{drop}<span class="grow"></span>{exports}</div>
   </div>
@@ -190,7 +191,7 @@ def _tuning() -> str:
     <div class="motion-found" hidden>
       <div class="row"><pre class="motion-found-lines mono" aria-label="Settings found"></pre><span class="grow"></span>
         {take}{send}{copy}</div>
-      <table class="mono"></table>
+      <div class="motion-times" tabindex="0" role="region" aria-label="Times"><table class="mono"></table></div>
       <p class="motion-known quiet"></p>
     </div>
     <div class="motion-map" hidden>
