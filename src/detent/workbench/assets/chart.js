@@ -115,7 +115,7 @@ export class Chart {
   grid({ pen, colour, x, y, w, h, what }) {
     const across = niceStep(what.right / Math.max(w / 86, 2)),
       bottom = what.bottom || 0,
-      up = niceStep((what.top - bottom) / Math.max(h / 26, 2));
+      up = niceStep((what.top - bottom) / Math.max(h / 20, 2));
     pen.strokeStyle = colour("--line");
     pen.fillStyle = colour("--ink-2");
     pen.beginPath();
