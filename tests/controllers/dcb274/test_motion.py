@@ -392,3 +392,21 @@ def test_page_46_a_limit_that_closes_on_a_ramp_to_rest_ends_it_by_the_k_of_now_i
         passed[slope] = bench.position - at
     assert passed["K 5 2"] < 60 < 1000 < passed["K 5 90"]
     assert passed["K 5 200"] <= passed["K 5 90"] + 90  # what is under way is not made longer
+
+
+@pytest.mark.parametrize(("flags", "then"), [("l 32", "M 5000"), ("l 32", "M 901"), ("l 0", "M 5000")])
+@pytest.mark.parametrize("later", [0, 1, 200_000, 499_999])
+def test_page_46_a_limit_that_closes_while_m_is_executed_is_not_driven_through(flags, then, later):
+    bench = Bench()
+    bench.do(flags)
+    bench.do("M 900", wait=12_000_000)
+    bench.say(then + "\r")
+    bench.run_to(bench.now + later)
+    at = bench.position
+    bench.pin("LIMIT-A", 0)
+    bench.run_to(bench.now + 2_000_000_000)
+    assert bench.position - at <= 10
+    bench.pin("LIMIT-A", 1)
+    bench.run_to(bench.now + 2_000_000_000)
+    assert bench.unit.status(bench.now).state == "ready"
+    assert bench.position - at <= 10

@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping, Sequence
 from random import Random
 from typing import Any, NamedTuple, Protocol
 
-from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Wait
+from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Store, Wait
 from tests.controllers.laws.histories import History, gap
+from tests.controllers.laws.motors import motor
 
 from detent.controllers.device import Controller
 from detent.ticks import Ns
@@ -71,6 +72,9 @@ class Model(Protocol):
     """The adapter of one model. See CONTRIBUTING, "The laws"."""
 
     name: str
+    axes: Sequence[str]
+    """Its axes."""
+
     phases: Sequence[str]
     """The phases of a motion, as `phase` names them."""
 
@@ -123,9 +127,18 @@ class Model(Protocol):
         """The position as it tells its host now, asked over the line; None if it cannot be asked now."""
 
 
+WITH_MOTOR = 0.04
+"""How many histories have a motor on the pins: one costs as much as ten without."""
+
+
 def ready(model: Model, history: History) -> Bench:
     """A bench with a device that has been switched on and is ready."""
-    bench = Bench(model.make(history.options), history.contacts)
+    axis, driven = history.motor, None
+    moved = [contact for contact in history.contacts if contact.axis == axis]
+    if axis is not None:
+        driven = motor(model.name, axis, moved)
+    contacts = [contact for contact in history.contacts if contact.axis != axis]
+    bench = Bench(model.make(history.options), contacts, driven, moved)
     bench.play((Power(True), *model.ready()))
     return bench
 
@@ -135,4 +148,10 @@ def history(model: Model, draw: Random, most: int = 12) -> History:
     deeds: list[Deed] = []
     for _ in range(draw.randint(1, most)):
         deeds += (*model.deeds(draw), Wait(gap(draw)))
-    return History(model.options(draw), model.contacts(draw), tuple(deeds))
+    if draw.random() < 0.05:
+        place = draw.randrange(len(deeds))
+        deeds[place:place] = [Store(False), *([Wait(gap(draw)), Store(True)] if draw.random() < 0.5 else [])]
+    made = History(model.options(draw), model.contacts(draw), tuple(deeds))
+    if draw.random() >= WITH_MOTOR:
+        return made
+    return made._replace(motor=draw.choice(model.axes))

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.controllers.device import Controller, Output, StoreImage
+from detent.cell.mechanics import Mechanics
+from detent.controllers.device import Controller, DriveSet, Output, Powered, StageSet, StoreImage
 from detent.pins import HIGH, LOW, Level, PinSet
 from detent.ticks import NEVER, Ns
 from detent.uart import Char, Sent
@@ -46,7 +47,13 @@ class Wait(NamedTuple):
     time: Ns
 
 
-Deed: TypeAlias = Say | Raw | Put | Power | Wait
+class Store(NamedTuple):
+    """Whether what is written to non-volatile memory from now on is kept: a memory breaks, and is well again."""
+
+    works: bool
+
+
+Deed: TypeAlias = Say | Raw | Put | Power | Wait | Store
 
 
 class Contact(NamedTuple):
@@ -148,10 +155,16 @@ class Watch:
 
 
 class Bench:
-    """A device, its contacts and its axes. It is off until `Power(True)` is played."""
+    """A device, its contacts and its axes. It is off until `Power(True)` is played.
 
-    def __init__(self, device: Controller, contacts: Sequence[Contact] = ()) -> None:
-        self.device = device
+    `motor`: one that sits on one of its axes, whose contacts (`moved`, by their places) are moved by its rotor.
+    """
+
+    def __init__(
+        self, device: Controller, contacts: Sequence[Contact] = (), motor: Mechanics | None = None,
+        moved: Sequence[Contact] = (),
+    ) -> None:  # fmt: skip
+        self.device, self.motor, self.moved = device, motor, moved
         self.port = device.serial_port.receives
         self.contacts = contacts
         self.now: Ns = 0
@@ -162,6 +175,9 @@ class Bench:
         self.watches: list[Watch] = []
         self._edges: list[tuple[Ns, Contact]] = []
         self._levels: dict[Contact, Level] = {}
+        self._stores = True
+        if motor is not None:
+            motor.power(True, 0)
 
     # -- doing -------------------------------------------------------------------------------------------
 
@@ -190,6 +206,8 @@ class Bench:
                 if on:  # a contact has its level from the beginning
                     for contact in self.contacts:
                         self._touch(contact)
+            case Store(works):
+                self._stores = works
         self.collect()
 
     def receive(self, chars: Sequence[Char]) -> None:
@@ -202,13 +220,17 @@ class Bench:
         """Let everything happen up to and including `until`: pulses and deadlines before the contacts they move."""
         while True:
             deadline = self.device.next_deadline()
-            at = min(NEVER if deadline is None else deadline, self._edges[0][0] if self._edges else NEVER)
+            at = min(NEVER if deadline is None else deadline, self._edges[0][0] if self._edges else NEVER,
+                     NEVER if self.motor is None else self.motor.deadline)  # fmt: skip
             if at > until:
                 break
             self.now = at
             if deadline is not None and deadline <= at:
                 self.device.advance(at)
                 self.collect()
+            if self.motor is not None and self.motor.deadline <= at:
+                self.motor.advance(at)
+                self._hear_motor()
             due = [contact for when, contact in self._edges if when <= at]
             for contact in due:
                 self._touch(contact)
@@ -224,25 +246,42 @@ class Bench:
         while out := self.device.drain():
             for item in out:
                 if isinstance(item, StoreImage):
-                    self.device.stored(True, self.now)
+                    self.device.stored(self._stores, self.now)
                 elif isinstance(item, MotionStarted | MotionCut | MotionEnded):
                     self.travels[item.axis].take(item)
                     moved = True
+                    if self.motor is not None:
+                        self.motor.follow(item)
+                elif isinstance(item, DriveSet | StageSet | Powered) and self.motor is not None:
+                    self.motor.heed(item)
             self.out += out
         if moved:
             self._plan()
         for watch in self.watches:
             watch.look(self)
 
+        if self.motor is not None:
+            self._hear_motor()
+
+    def _hear_motor(self) -> None:
+        """The contacts that the rotor moves."""
+        assert self.motor is not None
+        for item in self.motor.drain():
+            if isinstance(item, PinSet) and item.pin.isdigit():
+                self._give(self.moved[int(item.pin)].pin, item.level)
+
+    def _give(self, pin: str, level: Level) -> None:
+        self._about_to()
+        self.held[pin] = level
+        self.device.set_pin(pin, level, self.now)
+        self.collect()
+
     def _touch(self, contact: Contact) -> None:
         """The contact shows what the shaft makes of it."""
         level = contact.at(self.travels[contact.axis].shaft(self.now))
         if self._levels.get(contact) != level:
             self._levels[contact] = level
-            self._about_to()
-            self.held[contact.pin] = level
-            self.device.set_pin(contact.pin, level, self.now)
-            self.collect()
+            self._give(contact.pin, level)
 
     def _about_to(self) -> None:
         for watch in self.watches:

@@ -116,6 +116,7 @@ def soft_or_pending(bench: Bench) -> Ns:
 class Axis:
     """A DCB-274, in single mode or on a party line."""
 
+    axes = ("",)
     phases = ("rest", "a program at rest", "pre-energizing", "speeding up", "at speed", "slowing", "turning", "homing",
               "back home", "jogging", "pending", "a program moving")  # fmt: skip
 

@@ -55,6 +55,7 @@ def ahead(bench: Bench, axis: str) -> str:
 class Board:
     """A board; `hard`: limits stop at once, by order (page 12)."""
 
+    axes = ("X", "Y")
     phases = REPORTS
     modulus = 1 << 40  # it saturates, far away
 

@@ -69,6 +69,7 @@ def homing(bench: Bench) -> bool:
 class Module:
     """A module without checksums."""
 
+    axes = ("",)
     phases = ("rest", "a program at rest", "speeding up", "at speed", "slowing", "to the end of travel", "back home",
               "held")  # fmt: skip
 

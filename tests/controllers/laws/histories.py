@@ -19,12 +19,16 @@ GAPS: Sequence[Ns] = (0, 0, 0, 1, 1 * MS, 2 * MS, 12 * MS, 40 * MS, 90 * MS, 150
 
 
 class History(NamedTuple):
-    """How a device is built, what sits on its axes, what happens to it before and behind what a law speaks of."""
+    """How a device is built, what sits on its axes, what happens to it before and behind what a law speaks of.
+
+    `motor`: an axis that has one, whose rotor moves the contacts there; None: pulses move them all.
+    """
 
     options: Mapping[str, Any]
     contacts: tuple[Contact, ...]
     deeds: tuple[Deed, ...]
     later: tuple[Deed, ...] = ()
+    motor: str | None = None
 
     def smaller(self) -> "Iterator[History]":
         """The same with one thing less, or one wait shorter."""
@@ -34,6 +38,8 @@ class History(NamedTuple):
             yield self._replace(later=self.later[:n] + self.later[n + 1 :])
         for n in range(len(self.contacts)):
             yield self._replace(contacts=self.contacts[:n] + self.contacts[n + 1 :])
+        if self.motor is not None:
+            yield self._replace(motor=None)
         for name in self.options:
             yield self._replace(options={key: value for key, value in self.options.items() if key != name})
         for n, deed in enumerate(self.deeds):
@@ -71,6 +77,7 @@ def shown(history: History) -> str:
     """A history as a person reads it, a deed a line."""
     lines = [f"  {name} = {value!r}" for name, value in history.options.items()]
     lines += [f"  {contact}" for contact in history.contacts]
+    lines += [] if history.motor is None else [f"  a motor on {history.motor or 'the axis'}"]
     later = [f"  {deed}" for deed in history.later]
     return "\n".join(lines + [f"  {deed}" for deed in history.deeds] + ["later", *later] * bool(later))
 

@@ -40,6 +40,7 @@ class Drive:
     """A drive; its number is 1."""
 
     name = "supersigma"
+    axes = ("",)
     phases = ("rest", "speeding up", "at speed", "slowing", "braking", "to the switch", "from the switch")
 
     def options(self, draw: Random) -> Mapping[str, Any]:

@@ -175,11 +175,16 @@ class Motion:
         return self.at_rest
 
     def velocity(self, count: int, now: Ns) -> None:
-        """M, when the ramp before it is complete: a timer count with its sign, 0 stops."""
+        """M, when the ramp before it is complete: a timer count with its sign, 0 stops.
+
+        Where a limit has begun a stop while M was executed, it sets off from rest, if it may then.
+        """
         period = count * self._settings.divide
         if self.course is Course.VELOCITY:
             if period == 0:
                 self.soft_stop(now)
+            elif self._stopping:
+                self._reversed = period
             elif (period > 0) is (self._axis.direction > 0):
                 self._change(abs(period), now)
             else:
