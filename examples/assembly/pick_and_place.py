@@ -53,6 +53,8 @@ def in_virtual_time(figure: Path | None) -> None:
     from detent.cell.host import HostPort
     from detent.outputs import figures, signals
 
+    if figure is not None:
+        figures.check(figure)
     file = Path(__file__).with_name("cell.toml")
     description = parse(file.read_text(), str(file))
     cell = build(description, lambda name: file.with_name(name).read_text())
@@ -80,10 +82,13 @@ def on_drives(address: str) -> None:
 def main() -> None:
     """Choose by the argument."""
     argument = sys.argv[1] if len(sys.argv) > 1 else ""
-    if ":" in argument:
-        on_drives(argument)
-    else:
-        in_virtual_time(Path(argument) if argument else None)
+    try:
+        if ":" in argument:
+            on_drives(argument)
+        else:
+            in_virtual_time(Path(argument) if argument else None)
+    except (OSError, ValueError) as error:  # of the port, of its drives, or of the figure
+        sys.exit(str(error))
 
 
 if __name__ == "__main__":

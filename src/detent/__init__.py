@@ -24,4 +24,4 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     """What is there, `connect` and `connect_async` before their first use, too."""
-    return sorted({*globals(), *__all__})
+    return sorted(({*globals()} - {"TYPE_CHECKING"}) | {*__all__})

@@ -36,6 +36,9 @@ def test_signatures_of_a_shell_are_those_of_calls(kind: type[Any]) -> None:
         assert len(names) > 10
         for name in names:
             found = inspect.signature(getattr(unit, name))
+            of_class = inspect.signature(getattr(type(unit), name))
+            assert [*of_class.parameters] == ["self", *found.parameters], "as help of the class shows it"
+            assert of_class.return_annotation == found.return_annotation
             assert "self" not in found.parameters
             assert "Generator" not in str(found), name
             assert getattr(unit, name).__doc__

@@ -379,7 +379,7 @@ class Operation(Generic[P, T]):
 
     def __init__(self, method: Callable[Concatenate[Any, P], Steps[T]]) -> None:
         self._method = method
-        update_wrapper(self, method)  # type: ignore[arg-type]
+        update_wrapper(self, method)
 
     @overload
     def __get__(self, unit: None, owner: type[Any]) -> Self: ...
@@ -404,6 +404,16 @@ class Operation(Generic[P, T]):
         call.__signature__ = self.signature  # type: ignore[attr-defined]
         return call
 
+    def __call__(self, unit: Any, *given: P.args, **named: P.kwargs) -> Any:
+        """The method of a class, given a unit of it: ``BlockingGsC200.position(unit)``."""
+        return self.__get__(unit, type(unit))(*given, **named)
+
+    @property
+    def __signature__(self) -> Signature:
+        """As `signature`, behind the unit."""
+        own = next(iter(signature(self._method).parameters.values()))
+        return self.signature.replace(parameters=[own, *self.signature.parameters.values()])
+
     @cached_property
     def signature(self) -> Signature:
         """What a shell's call takes and returns: without the driver, and with the result in place of the steps."""
@@ -411,8 +421,12 @@ class Operation(Generic[P, T]):
         result = get_args(found.return_annotation)
         return found.replace(
             parameters=list(found.parameters.values())[1:],
-            return_annotation=result[-1] if len(result) == 3 else found.return_annotation,
+            return_annotation=_plain(result[-1]) if len(result) == 3 else found.return_annotation,
         )
+
+
+def _plain(kind: Any) -> Any:
+    return None if kind is type(None) else kind
 
 
 def operation(method: Callable[Concatenate[Any, P], Steps[T]]) -> Operation[P, T]:
