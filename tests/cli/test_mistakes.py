@@ -163,3 +163,33 @@ def test_a_mistake_is_told_with_what_to_do(
 def test_the_table_is_long_and_leaves_no_verb_out() -> None:
     assert len(cases()) >= 60
     assert {words.split()[0] for words, _ in cases()} >= set(VERBS) - {"tune", "docs"}
+
+
+READERS = """
+run | serve | service | epics | boards check | workbench | motor | table | asm gs-c200 | list dcb-274 | disasm dcb-274
+restore gs-c200 {port} | upload gs-c200 {port} | compare gs-c200 {port} | run gs-c200 --program
+tune gs-c200 --motor qsh4218-41-10-035 --moves 100 --batch | tune gs-c200 --moves 100 --motor
+compare-moves gs-c200 S=1 S=2 --moves 10 --motor | motor qsh4218-41-10-035 --curve
+"""
+
+
+@pytest.mark.parametrize("verb", [" ".join(words.split()) for words in re.split(r"[|\n]", READERS.strip())])
+def test_no_file_is_too_strange_to_be_told(
+    verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.chdir(tmp_path)
+    files = {
+        "binary": bytes(range(256)), "deep": b"a = " + b"[" * 5000 + b"]" * 5000, "digits": b"a = " + b"9" * 5000,
+        "nan": b"a = nan\nb = -inf\n", "words": b"hello, world\n", "marked": b"\xef\xbb\xbfhello\r\n\x1a",
+    }  # fmt: skip
+    for name, data in files.items():
+        Path(f"{name}.toml").write_bytes(data)
+    Path("folder.toml").mkdir()
+    for name in (*(f"{name}.toml" for name in files), "folder.toml", "/dev/zero"):
+        with pytest.raises(SystemExit) as ended:
+            main([*verb.format(port=NO_PORT).split(), name])
+        out, err = capsys.readouterr()
+        assert ended.value.code in (1, 2), (name, out, err)
+        assert err.startswith("detent: ") or re.match(r"\S+:\d+:\d+: ", err), (name, err)
+        assert "recursion" not in err, name

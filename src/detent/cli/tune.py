@@ -218,6 +218,7 @@ def _step(rig: RigOptions, model: str) -> str | None:
 def _check(
     outputs: list[Path], maps: list[Path], from_: Path | None, into: Path | None, overwrite: bool, each: bool
 ) -> None:
+    from detent.cli.rig import text_of
     from detent.outputs import figures
     from detent.outputs.files import check_outputs
 
@@ -231,6 +232,8 @@ def _check(
     check_outputs(outputs, [] if from_ is None else [from_], asked=overwrite, option="--overwrite")
     if from_ is not None and not from_.is_file():
         raise ValueError(f"--from {from_}: there is no such file")
+    if from_ is not None:
+        text_of(from_)  # before the work and not behind it
 
 
 @contextmanager

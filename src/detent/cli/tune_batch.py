@@ -128,8 +128,12 @@ def _answers(tasks: "Sequence[Task]", workers: int | None, scheduler: str | None
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        table = list(csv.reader(file, skipinitialspace=True))
+    from detent.realtime.texts import read_text
+
+    try:
+        table = list(csv.reader(read_text(path).splitlines(), skipinitialspace=True))
+    except (OSError, csv.Error) as error:
+        raise ValueError(f"{path}: cannot read it: {getattr(error, 'strerror', None) or error}") from None
     table = [row for row in table if any(cell.strip() for cell in row)]
     if len(table) < 2:
         raise ValueError(

@@ -46,7 +46,9 @@ class Backup(NamedTuple):
         """Read a file. Raises BackupError."""
         try:
             found = tomllib.loads(text)
-        except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        except RecursionError:
+            raise BackupError("it is no backup: its tables and lists are nested too deeply") from None
+        except (tomllib.TOMLDecodeError, ValueError) as error:
             raise BackupError(f"it is no TOML: {error}") from None
         if found.get("format") != FORMAT:
             raise BackupError(f"it is no backup: those begin with format = {_value(FORMAT)}; detent backup writes them")

@@ -58,7 +58,9 @@ def read(text: str, file: str) -> tuple[Motor, Curve | None]:
     """The motor in the TOML `text`, and its curve if it names one. MotorError says which key, and what to do."""
     try:
         data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+    except RecursionError:
+        raise MotorError(f"{file}: its tables and lists are nested too deeply: no key of a motor is") from None
+    except (tomllib.TOMLDecodeError, ValueError) as error:
         raise MotorError(f"{file}: this is no TOML: {error}") from None
     curve = data.pop("curve", None)
     _check_keys(file, "", data, (*NUMBERS, *WORDS, "curve"))
