@@ -2,7 +2,7 @@
 
 * ``fast``: a chopper whose current may fall against the full supply (ideal: no ripple);
 * ``slow``: a chopper that lets the current fall through the winding alone: it cannot follow a falling current, and
-damps;
+  damps;
 * ``mixed``: fast for `fast_part` of each off-time and slow for the rest: a falling current has that part of the supply;
 * ``auto``: slow below `decay_threshold`, fast above, slow at standstill (DCB-274, command b);
 * ``voltage``: pulse width without current feedback (Norberg's boards): the duty gives `current` at standstill.

@@ -313,7 +313,7 @@ class Commands(Unit):
 
     @operation
     def terminate(self) -> Steps[None]:
-        """|: end program and motion of this axis alone at once, without a ramp (page 57). Not in single mode."""
+        """``|``: end program and motion of this axis alone at once, without a ramp (page 57). Not in single mode."""
         if self.mode == "single":
             raise ValueError("| is for lines of several axes (page 57): abort()")
         yield from self._cut_in("|")

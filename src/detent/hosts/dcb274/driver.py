@@ -41,7 +41,7 @@ class Dcb274(Memory):
 
     @operation
     def halt(self) -> Steps[None]:
-        """Stop at once: by ESC in single mode, where lines have names by |, which stops this axis alone (page 57).
+        """Stop at once: by ESC in single mode, where lines have names by ``|``, which stops this axis alone (page 57).
 
         Raises DriverError if the axis does not take it; `abort` then stops every axis on the line.
         """
