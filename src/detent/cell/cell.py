@@ -366,7 +366,7 @@ class Cell:
             raise ValueError(f"{unit} has no pin {pin!r}")
         strapped = pin in getattr(
             self.parts[index], "straps", ()
-        )  # as RXD, which tells a GS-C200 that no host is there
+        )  # RXD of a GS-C200 is one
         if found.kind not in (PinKind.INPUT, PinKind.STRAP) and not strapped:
             raise ValueError(f"{unit}.{pin} is no input ({found.kind.value}): only inputs are given a level")
         return index
