@@ -92,3 +92,20 @@ def test_every_strap_can_be_tied_elsewhere_and_counts_at_the_next_power_on() -> 
             made.set_pin(unit, strap, 1 - level)
             assert controller.straps[strap] == 1 - level, f"{unit}.{strap}"
             made.set_pin(unit, strap, level)
+
+
+def test_hands_may_do_any_number_of_things_in_one_instant_and_the_journal_does_them_again() -> None:
+    """Only what the cell itself changes without end is an oscillation."""
+    made = cell(TEXT)
+    made.run_to(SECOND)
+    for number in range(1500):
+        made.set_pin("bar", "UI1", number % 2)
+        made.set_pin("drive", "RAIL", number % 2)
+        made.type("bar", "V1")
+    made.run_to(2 * SECOND)
+    again = cell(TEXT, journal=tuple(made.journal))
+    again.run_to(made.now)
+    assert made.recording is not None
+    assert again.recording is not None
+    assert list(made.recording) == list(again.recording)
+    assert len(made.journal) == 4500

@@ -135,6 +135,7 @@ class Cell:
             self._next_action += 1
             self._note_next_action()
             self._acting = True
+            self.circuit.another_cause()
             if _switches_on(action):
                 names = self._switched_on_with(action)
                 self.circuit.supply_all([self.unit(name) for name in names if not self.faults.switches(name, True)])
@@ -162,6 +163,7 @@ class Cell:
 
     def _catch_up(self) -> None:
         """What an action from outside makes due in this very instant happens in it."""
+        self.circuit.another_cause()
         now = self.now
         while self._next() <= now:
             self._advance(now)

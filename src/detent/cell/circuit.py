@@ -2,8 +2,8 @@
 
 What the parts did is delivered in rounds: those from which wires lead in the order of their names, so that the order in
 the file changes no pulse; before them the others, in file order. Outputs are delivered in the order they were made, and
-never merged; what a round causes is delivered in the next. More than `MOST_DELIVERIES` in one instant are an
-oscillation, and an error that names its pins.
+never merged; what a round causes is delivered in the next. More than `MOST_DELIVERIES` in one instant, and of
+one cause, are an oscillation, and an error that names its pins.
 """
 
 from collections import Counter
@@ -205,6 +205,10 @@ class Circuit:
         else:
             part.set_pin(pin, level, self.now)
         self._touched.add(index)
+
+    def another_cause(self) -> None:
+        """What follows in this instant has a cause of its own, outside: its level changes are counted by themselves."""
+        self._deliveries.clear()
 
     def _oscillation(self) -> Oscillation:
         """The error that names the inputs which change without end, each with the outputs that drive it."""
