@@ -260,6 +260,19 @@ def test_a_refused_line_that_was_sent_ends_with_status_1(capsys: pytest.CaptureF
     assert "gs-c200 refused 'A9'" in capsys.readouterr().err
 
 
+def test_a_line_that_an_adapter_turns_down_is_told_and_the_only_unit_may_be_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cell = tmp_path / "cell.toml"
+    cell.write_text('[units.ad]\nmodel = "sin-10"\n[units.x]\nmodel = "dcb-274"\noptions = { name = "X" }\n'
+                    'straps = { PARTY = 1 }\n[lines.host]\nunits = ["ad"]\n[lines.bus]\nunits = ["x"]\nhost = "ad"\n')  # fmt: skip
+    scan = ["--send", "ad:&", "--send", "@ 1 s"]
+    assert detent("run", str(cell), *scan, "--send", "ad:X+ 50", "--send", "ZM 900", "--for", "3", "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["units"]["x"]["position"] == 50
+    assert [(one["unit"], one["line"], one["answers"]) for one in found["refused"]] == [("ad", "ZM 900", ["#"])]
+
+
 def test_a_line_that_a_busy_module_turns_down_is_told_and_one_that_waits_for_idle_is_not(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -41,7 +41,19 @@ class Outcome(NamedTuple):
     @property
     def refused(self) -> "list[tuple[str, Refused, Exchange | None]]":
         """What was turned down: the unit, what it says, and the line that it was."""
-        return self.conversation.refused
+        from detent.controllers.device import Refused
+
+        self.conversation.listen()
+        axes, answers = self.cell.controllers(), self.conversation.answers
+        adapters = [one for one in self.conversation.exchanges if one.unit not in axes and "#" in answers(one)]
+        return self.conversation.refused + [
+            (
+                one.unit,
+                Refused(one.at, one.sent, "no axis of that name is known to it, or none answers; & looks for them"),
+                one,
+            )
+            for one in adapters
+        ]
 
     @property
     def said(self) -> dict[str, list[str]]:

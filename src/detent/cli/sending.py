@@ -39,7 +39,8 @@ def addressed(cell: "Cell", text: str) -> Step:
         except ValueError as error:
             raise Problem("", "--send", f"{error}; or '@ idle'") from None
     units = cell.serial_units() or list(cell.controllers())
-    unit, colon, line = (units[0], ":", text) if len(units) == 1 else text.partition(":")
+    named = text.startswith(f"{units[0]}:") if len(units) == 1 else True  # the only one may be left out
+    unit, colon, line = text.partition(":") if named else (units[0], ":", text)
     if not colon:
         raise Problem("", "--send", f"{text!r}: a cell has several units, write UNIT:LINE")
     if unit not in units:
