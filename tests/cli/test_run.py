@@ -264,8 +264,10 @@ def test_a_line_that_an_adapter_turns_down_is_told_and_the_only_unit_may_be_name
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     cell = tmp_path / "cell.toml"
-    cell.write_text('[units.ad]\nmodel = "sin-10"\n[units.x]\nmodel = "dcb-274"\noptions = { name = "X" }\n'
-                    'straps = { PARTY = 1 }\n[lines.host]\nunits = ["ad"]\n[lines.bus]\nunits = ["x"]\nhost = "ad"\n')  # fmt: skip
+    units = (
+        '[units.ad]\nmodel = "sin-10"\n[units.x]\nmodel = "dcb-274"\noptions = { name = "X" }\nstraps = { PARTY = 1 }\n'
+    )
+    cell.write_text(f'{units}[lines.host]\nunits = ["ad"]\n[lines.bus]\nunits = ["x"]\nhost = "ad"\n')
     scan = ["--send", "ad:&", "--send", "@ 1 s"]
     assert detent("run", str(cell), *scan, "--send", "ad:X+ 50", "--send", "ZM 900", "--for", "3", "--json") == 1
     found = json.loads(capsys.readouterr().out)

@@ -366,9 +366,7 @@ class Cell:
         found = find_pin(self.parts[index].pins, pin)
         if found is None:
             raise ValueError(f"{unit} has no pin {pin!r}")
-        strapped = pin in getattr(
-            self.parts[index], "straps", ()
-        )  # RXD of a GS-C200 is one
+        strapped = pin in getattr(self.parts[index], "straps", ())  # RXD of a GS-C200 is one
         if found.kind not in (PinKind.INPUT, PinKind.STRAP) and not strapped:
             raise ValueError(f"{unit}.{pin} is no input ({found.kind.value}): only inputs are given a level")
         return index
