@@ -14,18 +14,19 @@ PYTHON := .venv/bin/python
 STAMP := .venv/.installed
 SYSTEM_PACKAGES := sigrok-cli chromium npm
 AXE := axe-core@4.14.1
+TSC := typescript@5.9.3
 
-.PHONY: setup system axe run test test-all check bench fuzz chaos soak pythons lock docs clean
+.PHONY: setup system axe tsc run test test-all check bench fuzz chaos soak pythons lock docs clean
 
 setup: $(STAMP)
 
 run: $(STAMP)
 	@.venv/bin/detent demo
 
-test: check system axe
+test: check system axe tsc
 	$(PYTHON) -m pytest -n 2 --dist loadgroup -rs
 
-test-all: check system axe
+test-all: check system axe tsc
 	$(PYTHON) -m pytest -n 2 --dist loadgroup -m "slow or not slow" -rs
 
 check: $(STAMP)
@@ -91,6 +92,12 @@ axe: $(STAMP)
 	@[ -f .venv/axe/node_modules/axe-core/axe.min.js ] || { echo "Fetching $(AXE) ..."; \
 	    mkdir -p .venv/axe && npm install --silent --no-save --no-audit --no-fund --prefix .venv/axe $(AXE) > /dev/null 2>&1; } \
 	    || echo "could not fetch $(AXE) with npm: its tests are skipped"
+
+# What looks at the types of the scripts of the workbench.
+tsc: $(STAMP)
+	@[ -x .venv/tsc/node_modules/.bin/tsc ] || { echo "Fetching $(TSC) ..."; \
+	    mkdir -p .venv/tsc && npm install --silent --no-save --no-audit --no-fund --prefix .venv/tsc $(TSC) > /dev/null 2>&1; } \
+	    || echo "could not fetch $(TSC) with npm: its tests are skipped"
 
 clean:
 	rm -rf .venv .uv detent-demo .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,5 +1,7 @@
 // The moving parts of the page Cell: dials, slides with their switches, inputs under a hand, command lines.
 
+import { pitch } from "./forms.js";
+
 const { part, on, get, action, meant, underWay, make, call, toast, onTheme, theme, grouped } = window.detent;
 
 // -- dials ----------------------------------------------------------------------------------------------
@@ -18,12 +20,6 @@ part("dial", (svg) => {
 // -- slides ---------------------------------------------------------------------------------------------
 
 const AIR = 12; // px beside the scale
-
-function pitch(span, most) {
-  const raw = span / most;
-  const power = 10 ** Math.floor(Math.log10(raw));
-  return power * ([1, 2, 5].find((n) => n * power >= raw) || 10);
-}
 
 part("slide", (box) => {
   const facts = JSON.parse(box.dataset.facts);

@@ -76,7 +76,7 @@ class Editor {
                 begin = Math.min(from + column - 1, Math.max(to - 1, from));
               return CM.Decoration.mark({ class: "cm-wrong", message }).range(
                 begin,
-                Math.max(Math.min(begin + length, to), begin + (to > begin)),
+                Math.max(Math.min(begin + length, to), begin + Number(to > begin)),
               );
             })
             .filter(({ from, to }) => to > from),

@@ -7,7 +7,11 @@
 
 export class Feed {
   constructor(url, { onFrame, onNews, onFile, onState }) {
-    Object.assign(this, { url, onFrame, onNews, onFile, onState });
+    this.url = url;
+    this.onFrame = onFrame;
+    this.onNews = onNews;
+    this.onFile = onFile;
+    this.onState = onState;
     this.waiting = []; // messages to send once there is a connection
     this.wait = 500; // ms before the next attempt
     this.closed = false;
@@ -62,7 +66,11 @@ export class Feed {
 
 const filled = (length) => (length + 7) & ~7;
 
-function decode(buffer) {
+/**
+ * The header of a frame, with the arrays of its traces; or of a file, with its bytes.
+ * @param {ArrayBuffer} buffer
+ */
+export function decode(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   let at = filled(4 + length);

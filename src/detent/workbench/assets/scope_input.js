@@ -1,4 +1,4 @@
-/* The hands on the scope's plot: wheel, drag, pinch and keys become changes of the view and of the cursors.
+/* Input at the scope's plot: wheel, drag, pinch and keys become changes of the view and of the cursors.
 
    Drag the plot to pan, the time axis to choose a range; the wheel zooms about the pointer, with Shift it pans; two
    fingers zoom; a double click shows everything. The keys are in KEYS. `scope` has view, cursors, plot and the calls
@@ -15,6 +15,7 @@ export class ScopeInput {
     this.place = place;
     this.scope = scope;
     this.pointers = new Map();
+    /** @type {any} */ // of the `kind` pan, range, cursor or pinch
     this.drag = null;
     this.hover = null;
     for (const kind of [

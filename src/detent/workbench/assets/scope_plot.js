@@ -371,20 +371,13 @@ export function showTime(t, step) {
 /* A length of time in ns, for people: 1.25 ms. */
 export function showSpan(ns) {
   const size = Math.abs(ns);
-  for (const [unit, of] of [
-    ["s", 1e9],
-    ["ms", 1e6],
-    ["\u00b5s", 1e3],
-  ])
+  for (const [unit, of] of Object.entries({ s: 1e9, ms: 1e6, "\u00b5s": 1e3 }))
     if (size >= of) return `${+(ns / of).toPrecision(6)} ${unit}`;
   return `${Math.round(ns)} ns`;
 }
 
 export function showRate(hertz) {
-  for (const [unit, of] of [
-    ["MHz", 1e6],
-    ["kHz", 1e3],
-  ])
+  for (const [unit, of] of Object.entries({ MHz: 1e6, kHz: 1e3 }))
     if (hertz >= of) return `${+(hertz / of).toPrecision(5)} ${unit}`;
   return `${+hertz.toPrecision(5)} Hz`;
 }

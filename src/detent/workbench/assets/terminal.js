@@ -1,17 +1,13 @@
 // The page Terminal: rows of a line as they come, lines and scripts to send.
 
+import { bytes } from "./typed_bytes.js";
+
 const { part, on, frame, get, call, toast, seconds, remembered, remember } = window.detent;
 
 const MOST = 1500; // rows on the page
 const EVERY = 150; // ms between two looks at a line
 const MOST_SAID = 50;
 const RAW = "raw";
-
-/** The bytes that a person writes with \r, \n, \t, \\ and \xHH, one character a byte. */
-function bytes(text) {
-  return text.replace(/\\(r|n|t|\\|x[0-9a-fA-F]{2})/g, (whole, one) =>
-    one[0] === "x" ? String.fromCharCode(parseInt(one.slice(1), 16)) : { r: "\r", n: "\n", t: "\t", "\\": "\\" }[one]);
-}
 
 part("terminal", (box) => {
   const facts = JSON.parse(box.dataset.lines);
@@ -251,7 +247,7 @@ part("terminal", (box) => {
     if (numbers.children.length !== count) {
       numbers.replaceChildren(...Array.from({ length: count }, (_, n) => {
         const one = document.createElement("div");
-        one.textContent = n + 1;
+        one.textContent = String(n + 1);
         return one;
       }));
     }

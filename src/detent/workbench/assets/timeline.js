@@ -1,17 +1,11 @@
 // The time line: everything that is kept of the cell's past, with its marks. Dragging takes the cell there.
 
+import { pitch } from "./forms.js";
+
 const { part, on, frame, call, toast, seconds, get, turnTime } = window.detent;
 
 const COLOURS = { error: "#ff6b5e", caution: "#ffd84d", power: "#ffb02e", action: "#7fe3d0", breakpoint: "#ff8ad0", stored: "#8fb8ff" };
 const LEFT = 10; // px of air at both ends
-const NICE = [1, 2, 5];
-
-/** Steps of 1, 2, 5 times a power of ten in which `span` has at most `most` parts. */
-function pitch(span, most) {
-  const raw = span / most;
-  const power = 10 ** Math.floor(Math.log10(raw));
-  return power * (NICE.find((n) => n * power >= raw) || 10);
-}
 
 part("timeline", (box) => {
   const canvas = document.createElement("canvas");
@@ -217,7 +211,11 @@ part("waiting", (chip) => on("queue", (key, value) => {
 }));
 
 part("branches", (chip) => {
-  chip.addEventListener("click", () => document.querySelector("dialog.futures").showModal());
+  chip.addEventListener("click", () => {
+    /** @type {HTMLDialogElement} */
+    const futures = document.querySelector("dialog.futures");
+    futures.showModal();
+  });
   return on("branches", (key, value) => {
     const count = (value || []).length;
     chip.hidden = !count;

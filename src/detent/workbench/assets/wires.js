@@ -1,35 +1,18 @@
 // The wires of a cell, drawn between the jacks of its panels: along the gaps between them, never across one.
 
+import { passages, rounded } from "./wire_paths.js";
+
 const { part, on } = window.detent;
 
-const ROUND = 6; // px, of the corners
 const OUTSIDE = 46; // px beside the outermost panels, at most
 const NS = "http://www.w3.org/2000/svg";
-
-/** A path through points with right angles, its corners rounded. */
-function rounded(points) {
-  let path = `M${points[0][0]} ${points[0][1]}`;
-  for (let n = 1; n < points.length - 1; n += 1) {
-    const [[ax, ay], [bx, by], [cx, cy]] = [points[n - 1], points[n], points[n + 1]];
-    const into = Math.hypot(bx - ax, by - ay);
-    const out = Math.hypot(cx - bx, cy - by);
-    const r = Math.min(ROUND, into / 2, out / 2);
-    if (r < 0.5) {
-      path += `L${bx} ${by}`;
-      continue;
-    }
-    path += `L${bx + ((ax - bx) / into) * r} ${by + ((ay - by) / into) * r}`;
-    path += `Q${bx} ${by} ${bx + ((cx - bx) / out) * r} ${by + ((cy - by) / out) * r}`;
-  }
-  const last = points[points.length - 1];
-  return `${path}L${last[0]} ${last[1]}`;
-}
 
 /** The panels in `box`, and the gaps: columns between them as [left, right]. */
 function gaps(box, frame) {
   const cards = [...box.querySelectorAll(".panel")].map((card) => {
     const at = card.getBoundingClientRect();
-    return { card, left: at.left - frame.left, right: at.right - frame.left, top: at.top - frame.top, bottom: at.bottom - frame.top };
+    const [left, right] = [at.left - frame.left, at.right - frame.left];
+    return { card, left, right, top: at.top - frame.top, bottom: at.bottom - frame.top, column: 0 };
   });
   const lefts = [...new Set(cards.map((card) => Math.round(card.left)))].sort((a, b) => a - b);
   const columns = lefts.map((left) => {
@@ -41,20 +24,6 @@ function gaps(box, frame) {
   between.push([last, Math.min(frame.width, last + OUTSIDE)]);
   for (const one of cards) one.column = lefts.indexOf(Math.round(one.left));
   return { cards, between };
-}
-
-/** Heights at which a wire can run from x1 to x2 without touching a panel. */
-function passages(cards, x1, x2, height) {
-  const inWay = cards.filter((card) => card.right > Math.min(x1, x2) && card.left < Math.max(x1, x2));
-  const spans = inWay.map((card) => [card.top, card.bottom]).sort((a, b) => a[0] - b[0]);
-  const free = [];
-  let low = 0;
-  for (const [top, bottom] of spans) {
-    if (top - low > 6) free.push([low, top]);
-    low = Math.max(low, bottom);
-  }
-  free.push([low, Math.max(height, low + 20)]);
-  return free;
 }
 
 part("wires", (box) => {

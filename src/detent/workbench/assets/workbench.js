@@ -1,6 +1,9 @@
 // What every page of the workbench shares: the live table and the markup bound to it, calls, help, theme, keyboard.
 // The conventions are told in detent/workbench/pages/__init__.py.
 
+import { FORMS, grouped, seconds } from "./forms.js";
+import { Meanings } from "./meanings.js";
+
 const values = new Map(); // the live table, as far as this window knows it
 const bound = new Map(); // key -> Set of [element, kind]
 const listeners = []; // [prefix, function]
@@ -8,7 +11,7 @@ const frames = new Set();
 const parts = new Map(); // name -> setup
 const living = new Map(); // element with data-part -> what ends it
 const waiting = new Map(); // number of a call -> [resolve, reject]
-const meanings = new Map(); // key -> [what calls under way make of it, how many those are]
+const meanings = new Meanings((key) => values.get(key));
 const opening = []; // what is called when there is a connection
 const PATIENCE = 8000; // ms that a call waits for one
 let socket = null;
@@ -46,7 +49,7 @@ function connect() {
 
 /** Make a call; it waits a while for the connection, if there is none. */
 function call(name, ...args) {
-  return name in STANDS ? make("held", STANDS[name], () => say(name, args)) : say(name, args);
+  return name in STANDS ? meanings.make("held", STANDS[name], () => say(name, args)) : say(name, args);
 }
 
 async function say(name, args) {
@@ -74,30 +77,8 @@ function connected() {
 
 const STANDS = { hold: true, go: false, step_event: true, step_back: true, step_instruction: true, rewind: true, program_run_to: false };
 
-/** What `key` is once all calls under way are done; if none is, what it is (`now`, or as the table says). */
-function meant(key, now = values.get(key)) {
-  return meanings.has(key) ? meanings.get(key)[0] : now;
-}
-
-/** Whether calls are under way that make something else of `key`. */
-const underWay = (key) => meanings.has(key);
-
-/** Make the calls of `going`, which are to make `value` of `key`. The table has it before they are answered. */
-async function make(key, value, going) {
-  const one = meanings.get(key) || [value, 0];
-  one[0] = value;
-  one[1] += 1;
-  meanings.set(key, one);
-  try {
-    return await going();
-  } finally {
-    one[1] -= 1;
-    if (!one[1]) meanings.delete(key);
-  }
-}
-
 /** Time stands if it goes, and goes if it stands. */
-const turnTime = () => action(meant("held") ? "go" : "hold");
+const turnTime = () => action(meanings.of("held") ? "go" : "hold");
 
 /** The same for a hand at the page: an error is shown, and nothing is thrown. */
 async function action(name, ...args) {
@@ -209,36 +190,6 @@ function frame(drawn) {
   return () => frames.delete(drawn);
 }
 
-// -- how values are written -----------------------------------------------------------------------------
-
-const THIN = "\u2009";
-const MINUS = "\u2212";
-
-function grouped(number) {
-  const text = Math.abs(number).toString().replace(/\B(?=(\d{3})+$)/g, THIN);
-  return number < 0 ? MINUS + text : text;
-}
-
-/** Nanoseconds as seconds, to the microsecond. */
-function seconds(ns) {
-  if (ns === null || ns === undefined) return "\u2013";
-  const micro = Math.floor(ns / 1000);
-  const whole = Math.floor(micro / 1e6);
-  const rest = String(micro % 1e6).padStart(6, "0");
-  return `${grouped(whole)}.${rest.slice(0, 3)}${THIN}${rest.slice(3)}`;
-}
-
-const FORMS = {
-  plain: (value) => (value === null || value === undefined ? "" : String(value)),
-  time: seconds,
-  steps: (value) => (value === null || value === undefined ? "\u2013" : (value > 0 ? "+" : "") + grouped(Math.round(value))),
-  count: (value) => (value === null || value === undefined ? "\u2013" : grouped(Math.round(value))),
-  rate: (value) => (value === null || value === undefined ? "\u2013" : grouped(Math.round(value))),
-  level: (value) => (value === null || value === undefined || value === "" ? "\u00b7" : String(value)),
-  fixed: (value) => (value === null || value === undefined ? "\u2013" : (value < 0 ? MINUS : "") + Math.abs(value).toFixed(2)),
-  pace: (value) => (value === null || value === undefined ? "as fast as it goes" : `${Number(value.toPrecision(3))}\u00d7`),
-};
-
 // -- help, messages -------------------------------------------------------------------------------------
 
 let helpBox = null;
@@ -274,23 +225,30 @@ function hideHelp() {
   helped = null;
 }
 
+/**
+ * The element that an event comes from.
+ * @param {Event} event
+ * @returns {any}
+ */
+const origin = (event) => event.target;
+
 function listenForHelp() {
   document.addEventListener("pointerover", (event) => {
-    const element = event.target.closest && event.target.closest("[data-help]");
+    const element = origin(event).closest && origin(event).closest("[data-help]");
     if (element === helped) return;
     hideHelp();
     if (element && event.pointerType === "mouse") helpSoon = setTimeout(() => showHelp(element), 350);
   });
   document.addEventListener("pointerdown", (event) => {
     hideHelp();
-    const element = event.target.closest("[data-help]");
+    const element = origin(event).closest("[data-help]");
     if (element && event.pointerType !== "mouse") helpSoon = setTimeout(() => showHelp(element), 500);
   });
   document.addEventListener("pointerup", () => clearTimeout(helpSoon));
   document.addEventListener("scroll", hideHelp, true);
   document.addEventListener("focusin", (event) => {
-    const element = event.target.closest("[data-help]");
-    if (element && event.target.matches(":focus-visible")) showHelp(element);
+    const element = origin(event).closest("[data-help]");
+    if (element && origin(event).matches(":focus-visible")) showHelp(element);
   });
   document.addEventListener("focusout", hideHelp);
 }
@@ -318,24 +276,24 @@ function toast(text, kind = "note") {
 
 function argument(written) {
   if (typeof written !== "string") return written;
-  if (written.startsWith("!")) return meant(written.slice(1)) ? 0 : 1;
+  if (written.startsWith("!")) return meanings.of(written.slice(1)) ? 0 : 1;
   if (written.startsWith("=")) return values.get(written.slice(1));
   return written;
 }
 
 function listenForActions() {
   document.addEventListener("click", (event) => {
-    const element = event.target.closest("[data-do]");
+    const element = origin(event).closest("[data-do]");
     if (!element || element.disabled) return;
     const written = JSON.parse(element.dataset.args || "[]");
     const args = written.map(argument);
     const turned = written.findIndex((one) => typeof one === "string" && one.startsWith("!"));
     if (turned < 0) action(element.dataset.do, ...args);
-    else make(written[turned].slice(1), args[turned], () => action(element.dataset.do, ...args));
+    else meanings.make(written[turned].slice(1), args[turned], () => action(element.dataset.do, ...args));
   });
   document.addEventListener("click", (event) => {
     // a pointer does not leave the focus at a button or tab, where the next space would press it once more
-    if (event.detail > 0) event.target.closest("button, a")?.blur();
+    if (event.detail > 0) origin(event).closest("button, a")?.blur();
   });
   document.addEventListener("keydown", (event) => {
     if (event.key !== "F8" || event.defaultPrevented || event.ctrlKey || event.altKey || event.shiftKey) return;
@@ -344,7 +302,7 @@ function listenForActions() {
   });
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const at = event.target;
+    const at = origin(event);
     if (at.closest("input, textarea, select, [contenteditable], .cm-editor, [role=dialog]")) return;
     const keys = { ".": "step_event", ",": "step_back", "[": "slower", "]": "faster" };
     if (event.key === " ") {
@@ -357,8 +315,9 @@ function listenForActions() {
     } else if (event.key === "?") {
       document.dispatchEvent(new CustomEvent("detent-tour"));
     } else if (/^[1-9]$/.test(event.key)) {
-      const tab = document.querySelectorAll("nav.tabs a")[Number(event.key) - 1];
-      if (tab) tab.click();
+      /** @type {NodeListOf<HTMLElement>} */
+      const tabs = document.querySelectorAll("nav.tabs a");
+      tabs[Number(event.key) - 1]?.click();
     }
   });
 }
@@ -408,6 +367,7 @@ function markTab() {
     if (here) tab.setAttribute("aria-current", "page");
     else tab.removeAttribute("aria-current");
   }
+  /** @type {HTMLElement | null} */
   const here = document.querySelector("nav.tabs a[aria-current]");
   here?.scrollIntoView({ block: "nearest", inline: "center" }); // on a phone the tabs are wider than the window
   const title = document.documentElement.dataset.title || "Detent";
@@ -465,7 +425,11 @@ function followTabs() {
 }
 
 window.detent = {
-  part, on, frame, call, action, meant, underWay, make, turnTime, turning: () => meanings.size > 0, toast, onTheme, theme, remembered, remember, seconds, grouped,
+  part, on, frame, call, action, turnTime, toast, onTheme, theme, remembered, remember, seconds, grouped,
+  meant: (key, now = values.get(key)) => meanings.of(key, now),
+  underWay: (key) => meanings.underWay(key),
+  make: (key, value, going) => meanings.make(key, value, going),
+  turning: () => meanings.any,
   get: (key) => values.get(key),
   keys: () => values.keys(),
   forms: FORMS,

@@ -1,0 +1,40 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { FORMS, grouped, pitch, seconds } from "./assets/forms.js";
+
+test("numbers stand in groups of three, with a real minus", () => {
+  assert.equal(grouped(0), "0");
+  assert.equal(grouped(999), "999");
+  assert.equal(grouped(1000), "1\u2009000");
+  assert.equal(grouped(-16777215), "\u221216\u2009777\u2009215");
+});
+
+test("nanoseconds are cut to the microsecond, never rounded into the future", () => {
+  assert.equal(seconds(null), "\u2013");
+  assert.equal(seconds(0), "0.000\u2009000");
+  assert.equal(seconds(999), "0.000\u2009000");
+  assert.equal(seconds(1_234_567_999), "1.234\u2009567");
+  assert.equal(seconds(3600e9), "3\u2009600.000\u2009000");
+});
+
+test("what is not known is told, in every form", () => {
+  for (const [name, form] of Object.entries(FORMS)) assert.equal(typeof form(null), "string", name);
+  assert.equal(FORMS.level(""), "\u00b7");
+  assert.equal(FORMS.level(0), "0");
+  assert.equal(FORMS.steps(12), "+12");
+  assert.equal(FORMS.steps(-12), "\u221212");
+  assert.equal(FORMS.pace(null), "as fast as it goes");
+  assert.equal(FORMS.pace(0.01), "0.01\u00d7");
+});
+
+test("a scale is divided by 1, 2 or 5 into at most so many parts, and not into many less", () => {
+  for (const most of [2, 5, 7, 12])
+    for (let span = 1e-3; span < 1e12; span *= 1.37) {
+      const step = pitch(span, most);
+      const digit = step / 10 ** Math.floor(Math.log10(step) + 1e-9);
+      assert.ok([1, 2, 5].some((nice) => Math.abs(digit - nice) < 1e-6), `${span} / ${most}: ${step}`);
+      assert.ok(span / step <= most * (1 + 1e-9), `${span} / ${most}: ${step} is too fine`);
+      assert.ok(span / step > most / 2.6, `${span} / ${most}: ${step} is too coarse`);
+    }
+});
