@@ -351,7 +351,9 @@ def test_a_plug_that_sends_back_what_it_hears_is_no_controller() -> None:
             data, self.back = self.back, b""
             return data
 
-    assert search_at(Loopback(alone("gs-c200")), plan()) == []
+    for model in ("gs-c200", "dcb-274", "bs0610", "supersigma"):
+        with pytest.raises(Talks, match="looped or crossed"):
+            search_at(Loopback(alone("gs-c200")), plan((model,)))
 
 
 def test_the_error_that_a_program_left_behind_is_fetched_and_told() -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol, cast
 
-from detent.hosts.exchange import NOTHING, Answer, Blocking, Clear, Driver, Port, Step, Steps, Watch
+from detent.hosts.exchange import NOTHING, Answer, Ask, Blocking, Clear, Driver, Port, Step, Steps, Watch
 from detent.hosts.finding import PATIENCE, Found, Pass, Tune, plan, search
 from detent.realtime.addresses import Address
 from detent.realtime.ports import RealPort
@@ -39,7 +39,7 @@ class FormattedPort(Port, Protocol):
 
 
 class Talks(RuntimeError):
-    """Something on the line talks without being asked, and says no end of it."""
+    """What is on the line is no controller: it talks unasked and without end, or sends back all it hears."""
 
 
 def passes_for(address: Address, models: Iterable[str], rates: Iterable[int] | None) -> list[Pass]:
@@ -60,8 +60,11 @@ def find(address: Address, passes: list[Pass], watch: Watch | None = None) -> li
 
 def search_at(port: FormattedPort, passes: list[Pass], watch: Watch | None = None) -> list[Found]:
     """The same at an open port, or at the line of a cell."""
-    # its steps are those of an operation, and `Tune`
-    return _Searcher(_Nobody(), port, watch).perform(cast("Steps[list[Found]]", search(passes)))
+    searcher = _Searcher(_Nobody(), port, watch)
+    found = searcher.perform(cast("Steps[list[Found]]", search(passes)))  # steps of an operation, and `Tune`
+    if not found and searcher.echoes > searcher.others:
+        raise Talks("nobody answers, and what is sent comes back: the line is looped or crossed, or an adapter echoes")
+    return found
 
 
 class _Nobody(Driver):
@@ -74,6 +77,7 @@ class _Searcher(Blocking):
     """Carries out the steps of a search."""
 
     port: FormattedPort
+    echoes = others = 0  # answers that were the question, and answers that were none
 
     def _do(self, step: Step | Tune) -> Answer:
         match step:
@@ -85,6 +89,12 @@ class _Searcher(Blocking):
                     heard += len(data)
                     if heard > MOST_HEARD:
                         raise Talks("something talks there without being asked: no controller")
+            case Ask(data):
+                answer = super()._do(step)
+                if answer.data:
+                    echo = data.startswith(answer.data)
+                    self.echoes, self.others = self.echoes + echo, self.others + (not echo)
+                return answer
             case _:
                 return super()._do(step)
         return NOTHING
