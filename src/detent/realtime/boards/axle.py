@@ -8,6 +8,7 @@ from detent.realtime.boards.guard import Guard
 from detent.realtime.boards.plan import DrivenAxis
 from detent.realtime.boards.states import Standing
 from detent.realtime.boards.stepper import Stepper
+from detent.realtime.pace import WallNs
 from detent.ticks import NEVER, Ns
 
 Motion: TypeAlias = MotionStarted | MotionCut | MotionEnded
@@ -23,6 +24,7 @@ class Axle:
         self.lost = False  # its board was without supply, and no switch has stopped it since: nobody knows its place
         self.stops = 0
         self.limited = 0.0  # amperes that were asked of its driver and are more than it gives; told
+        self.awaits: tuple[str, WallNs] | None = None  # an input has stopped another axis, and this one too; since when
         self.held: tuple[str, int] | None = None  # which input stopped it last, and where
         self.singles = 0  # so many times in a row a single pulse after the last time
         self.rested: Ns | None = 0  # since when it is at rest; None while it moves

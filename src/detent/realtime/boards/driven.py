@@ -114,6 +114,7 @@ class Driven(Mishaps):
         """What is over by now, and what is certain; and whether all is as it should be."""
         self._refresh()
         self._currents()
+        self._not_stopped()
         self._prove()
         if self._stores.first < NEVER:
             self._stores.flush(self._horizon())
@@ -127,7 +128,8 @@ class Driven(Mishaps):
     def _prove(self) -> None:
         """At rest a stepper has been told of all pulses that the cell gave, and of no others: whatever befell it."""
         for axle in self.axles:
-            if axle.standing is Standing.DRIVEN and axle.motion is None and axle.stepper.resting:
+            resting = axle.motion is None and axle.stepper.resting and axle.awaits is None
+            if axle.standing is Standing.DRIVEN and resting:
                 sent, here = axle.stepper.shaft, axle.shaft_at(self.cell.now)
                 if sent != here and not self._pending:
                     self._fault(axle, f"{sent} steps were sent where the cell has {here}")

@@ -32,7 +32,9 @@ class Mishaps(TakingBack):
                     self._give(name, int(level), at + self._shift)
             case Stopped():
                 axle = self._by_stepper[event.stepper]
-                if axle.standing is Standing.DRIVEN and event.input in self.plan.inputs:
+                if axle.standing is Standing.DRIVEN and axle.awaits is not None:
+                    self._stopped_too(axle, event)
+                elif axle.standing is Standing.DRIVEN and event.input in self.plan.inputs:
                     self._stopped(event)
                 elif axle.standing is Standing.DRIVEN:
                     self._fault(axle, "the board has stopped it, and does not say why")
@@ -170,7 +172,7 @@ class Mishaps(TakingBack):
 
     def _driven_again(self, axle: Axle) -> None:
         axle.guard.release()
-        axle.standing, axle.why, axle.known = Standing.DRIVEN, "", not axle.lost
+        axle.standing, axle.why, axle.known, axle.awaits = Standing.DRIVEN, "", not axle.lost, None
         unit = self.cell.unit(axle.what.unit)
         for out in self._outs.values():
             levels = out.levels.before(out.levels.count)

@@ -17,8 +17,9 @@ from detent.realtime.boards.events import (
 from detent.realtime.boards.leaving import Leaving, Out
 from detent.realtime.boards.past import Moment
 from detent.realtime.boards.states import Standing, Weight
-from detent.ticks import Ns
+from detent.ticks import MS, Ns
 
+AWAITED: Ns = 100 * MS  # reports of a trigger come every 25 ms
 MOST_SINGLES = 8  # pulses in a row that an input stops one by one
 
 
@@ -66,7 +67,7 @@ class TakingBack(Leaving):
         actions.append(SetPin(unit, pin, level))
         drop = {(when, set_) for when, set_, _ in self._reports if when > at and (set_.unit, set_.pin) in late}
         self._reports = deque((item for item in self._reports if item[:2] not in drop), maxlen=256)
-        self._take_back(axle, at, actions, lambda action: (action.at, action.what) in drop, event.shaft)
+        self._take_back(axle, at, actions, lambda action: (action.at, action.what) in drop, event)
         self._raw[event.input], self._given[event.input] = int(event.present), level
         if int(event.present) != level:
             self._give(event.input, int(event.present), self.clock())
@@ -90,7 +91,7 @@ class TakingBack(Leaving):
         return axle.singles >= MOST_SINGLES
 
     def _take_back(
-        self, stopped: Axle, at: Ns, actions: Sequence[Action], drop: Callable[[TimedAction], bool], shaft: int
+        self, stopped: Axle, at: Ns, actions: Sequence[Action], drop: Callable[[TimedAction], bool], event: Stopped
     ) -> None:
         """The cell lives on from `at`, where `actions` are done; tell the boards only what is different."""
         self.on_taken_back(at)
@@ -145,7 +146,7 @@ class TakingBack(Leaving):
                 instead = "" if right is None else f"; it would be {right.char.value:#04x}"
                 what = f"a host heard {wrong.char.value:#04x} of {wrong.at / 1e9:.4f} s before a stop took it back"
                 self._say(Weight.WARNING, what + instead)
-        self._tell_axles(stopped, shaft, motions, counts)
+        self._tell_axles(stopped, event, motions, counts)
         if stopped.standing is Standing.DRIVEN:  # before any pulse leaves; those that came and went meanwhile, too
             for when, inputs in met:
                 stopped.guard.want(inputs, when, when)
@@ -169,19 +170,23 @@ class TakingBack(Leaving):
                     count += enables or not entry.on
         return count
 
-    def _tell_axles(self, stopped: Axle, shaft: int, old: dict[str, list[Motion]], counts: Sequence[int]) -> None:
+    def _tell_axles(self, stopped: Axle, event: Stopped, old: dict[str, list[Motion]], counts: Sequence[int]) -> None:
         now = self.cell.now
         for axle, count in zip(self.axles, counts, strict=False):
             new = axle.motions.since(count)
             if axle.standing is not Standing.DRIVEN:
                 continue
             if axle is not stopped:
+                if new != old[axle.name] and axle.guard.armed.get(event.input) == int(event.level):
+                    axle.awaits = event.input, self._wall()
+                    axle.stepper.halt()
+                    continue
                 lost = axle.tell_difference(old[axle.name], new, now)
                 if lost:
                     axle.end_told(now, old[axle.name])
                     self._contradicted(axle, stopped, lost)
                 continue
-            axle.stepper.rewind(shaft)
+            axle.stepper.rewind(event.shaft)
             force = axle.motion_after(count)
             if force is not None:
                 axle.stepper.tell(force)
@@ -200,6 +205,32 @@ class TakingBack(Leaving):
         self.boards.outs[out.name].rewind(at)
         for when, level in new:
             self._set(out, level, when)
+
+    def _stopped_too(self, axle: Axle, event: Stopped) -> None:
+        """What stopped another axis stopped this one at the same instant: the cell has been there already.
+
+        The two are looked at one after the other, and one may be later than the other: some steps may be between.
+        """
+        axle.awaits = None
+        axle.guard.fired()
+        axle.stops += 1
+        if axle.motion is not None:
+            self._fault(axle, f"{event.input} has stopped it, and it moves on in the cell")
+        self._place(axle, event.shaft)
+        axle.stepper.rewind(event.shaft)
+        self._arm()
+        self._pending = True
+
+    def _not_stopped(self) -> None:
+        """An axis that should have been stopped as another was, and was not, has made what it was sent."""
+        for axle in self.axles:
+            if axle.awaits is None or axle.standing is not Standing.DRIVEN:
+                continue
+            name, since = axle.awaits
+            if self._wall() - since > self.plan.lead + axle.stepper.behind(self.cell.now) + AWAITED:
+                axle.awaits = None
+                self._fault(axle, f"{name} has not stopped it as it stopped another axis")
+                self._place(axle, axle.stepper.shaft)
 
     def _contradicted(self, axle: Axle, stopped: Axle, lost: int) -> None:
         """Pulses left that the cell did not give after all: it is told where the motor is, and the axis stands."""

@@ -1,0 +1,180 @@
+"""Random sessions on the other controllers, with a computer that is late now and then: nothing is lost or hidden.
+
+Hosts say what they like, hands press what they like, the computer stalls. At the end the motor stands where the cell
+has it, every input is in the cell as it is on the board, no host heard what was taken back, and no axis is at fault.
+"""
+
+from random import Random
+from typing import NamedTuple
+
+import pytest
+from tests.realtime.boards.driven_bench import Bench
+
+from detent.realtime.boards.states import Standing, Weight
+from detent.ticks import MS, SECOND, US
+
+BOARD = '[boards.b]\nserial = "fake"\nlead = "{lead} ms"\n'
+
+
+class Kind(NamedTuple):
+    """A cell file, what hosts say, which inputs hands press, and what brings it to rest."""
+
+    text: str
+    lines: tuple[str, ...]
+    presses: tuple[str, ...]
+    steppers: tuple[str, ...]
+    ends: tuple[str, ...] = ()
+
+
+GS = """
+[units.x]
+model = "gs-c200s"
+straps = { CHS = "low" }
+[hardware.x]
+board = "b"
+step = "!gpio2"
+dir = "gpio3"
+enable = "gpio4"
+outputs = { MOV = "gpio6", RDY = "!gpio7", UO1 = "gpio8" }
+inputs = { EOT = "^gpio10", HOME = "^gpio11", ENABLE = "^gpio12", UI1 = "^gpio13", UI2 = "^gpio14" }
+"""
+BS = """
+[units.x]
+model = "bs0610"
+options = { hard_stop = "yes" }
+[hardware.x]
+board = "b"
+inputs = { RST = "^gpio20", "Y+" = "^gpio21", "X+" = "^gpio22", "X-" = "^gpio23" }
+[hardware.x.X]
+board = "b"
+step = "gpio2"
+dir = "gpio3"
+inputs = { "LX-" = "^gpio10", "LX+" = "^gpio11" }
+[hardware.x.Y]
+board = "b"
+step = "gpio4"
+dir = "gpio5"
+inputs = { "LY-" = "^gpio12", "LY+" = "^gpio13" }
+"""
+SUPERSIGMA = """
+[units.x]
+model = "supersigma"
+[hardware.x]
+board = "b"
+step = "!gpio2"
+dir = "gpio3"
+inputs = { RAIL = "^gpio10", FORCE = "^gpio11" }
+"""
+KINDS = {
+    "gs-c200s": Kind(
+        GS,
+        ("S{s}", "T{t}", "R{k}", "+{n}", "-{n}", "g+", "g-", "H+", "H-", "A1", "C1", "g+1"),
+        ("x.ENABLE", "x.UI1"),
+        ("x",),
+        ("@", "K"),
+    ),
+    "bs0610": Kind(
+        BS,
+        ("X{n}G", "X-{n}G", "Y{n}G", "Y-{n}G", "X+S", "X-S", "XZ", "X{n}GYZ", "R{t}", "K{k}"),
+        ("x.Y+", "x.X+", "x.X-", "x.RST"),
+        ("x.X", "x.Y"),
+        ("RST",),
+    ),
+    "supersigma": Kind(SUPERSIGMA, ("originate", "move +{n}", "move -{n}", "stop", "emergency"), ("x.FORCE",), ("x",)),
+}
+
+
+def switches(kind: str, random: Random) -> dict[str, tuple[str, int, int]]:
+    """Where the machine closes what."""
+    edge, far = random.randrange(30, 400), 10**6
+    if kind == "gs-c200s":
+        return {"x.EOT": ("x", edge, far), "x.HOME": ("x", -far, random.randrange(-20, edge))}
+    if kind == "bs0610":
+        return {"x.LX+": ("x.X", edge, far), "x.LX-": ("x.X", -far, -edge), "x.LY+": ("x.Y", edge // 2, far)}
+    return {"x.RAIL": ("x", -far, -edge // 8 - 2)}
+
+
+def session(kind: str, seed: int) -> int:
+    """One of them; how many stops there were."""
+    random, what = Random(seed), KINDS[kind]
+    closed = switches(kind, random)
+    text = what.text + BOARD.format(lead=random.choice([5, 10, 30, 60]))
+    with Bench(text, switches=closed, jitter=lambda: random.randrange(400 * US)) as bench:
+        bench.run(400 * MS)
+        for _ in range(random.randrange(4, 14)):
+            line = random.choice(what.lines).format(
+                n=random.randrange(1, 800), s=random.choice([5, 10, 20, 50]), t=random.randrange(50, 300),
+                k=random.randrange(1, 60),
+            )  # fmt: skip
+            if kind == "bs0610":
+                bench.send("x", line.encode())
+            else:
+                bench.type("x", line)
+            bench.run(random.choice([1 * MS, 8 * MS, 40 * MS, 200 * MS, 900 * MS]) + random.randrange(MS))
+            if random.random() < 0.15:
+                bench.stall(random.randrange(5 * MS, 120 * MS))
+            if random.random() < 0.25:
+                bench.press(random.choice(what.presses), random.randrange(2))
+        for name in what.presses:
+            bench.press(name, 1)
+        bench.run(50 * MS)
+        for end in what.ends:
+            if end == "RST":
+                bench.press("x.RST", 0)
+                bench.run(100 * MS)
+                bench.press("x.RST", 1)
+                bench.run(500 * MS)
+            else:
+                bench.type("x", end)
+                bench.run(100 * MS)
+        bench.rest(20 * SECOND)
+        bench.check_inputs()
+        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert bench.driven.escaped == 0
+        for state, stepper in zip(bench.driven.axes(), what.steppers, strict=True):
+            assert state.standing is Standing.DRIVEN
+            assert state.moving or state.shaft == bench.position(stepper)
+            if kind == "bs0610":
+                places = [0, *(place for _, place in bench.edges(stepper))]
+                limits = [(low, high) for name, low, high in closed.values() if name == stepper]
+                assert not [place for place in places for low, high in limits if low < place < high]
+        return sum(state.stops for state in bench.driven.axes())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_whatever_is_said_and_pressed_nothing_is_lost(kind: str) -> None:
+    assert sum(session(kind, seed) for seed in range(8)) > 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_whatever_is_said_and_pressed_nothing_is_lost_in_many_sessions(kind: str) -> None:
+    assert sum(session(kind, seed) for seed in range(100, 200)) > 30
+
+
+@pytest.mark.parametrize("late", [0, 60])
+def test_an_input_that_stops_two_axes_stops_both_and_each_count_is_the_boards(late: int) -> None:
+    """A reset in mid-move of both motors: two triggers fire, and the cell is taken back for the first of them."""
+    text = KINDS["bs0610"].text + BOARD.format(lead=30)
+    with Bench(text) as bench:
+        bench.run(400 * MS)
+        bench.send("x", b"X+S")
+        bench.run(100 * MS)
+        bench.send("x", b"Y-S")
+        bench.run(100 * MS)
+        bench.stall(late * MS)  # a slip of each, not of the same length
+        bench.run(100 * MS)
+        bench.press("x.RST", 0)
+        bench.run(300 * MS)
+        stopped = [bench.position("x.X"), bench.position("x.Y")]
+        assert stopped[0] > 50
+        assert stopped[1] < -20
+        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert [state.shaft for state in bench.driven.axes()] == stopped
+        assert [state.stops for state in bench.driven.axes()] == [1, 1]
+        bench.press("x.RST", 1)
+        bench.run(600 * MS)
+        bench.send("x", b"X-30G")
+        bench.run(SECOND)
+        bench.rest()
+        assert [bench.position("x.X"), bench.position("x.Y")] == [stopped[0] - 30, stopped[1]]
