@@ -12,7 +12,7 @@ from detent.realtime import verbs
 from detent.realtime.control import Control, Ending
 from detent.realtime.service import Service
 from detent.realtime.verbs import AskedWrongly, Verb
-from detent.realtime.watch import MOST_EVENTS, Lately
+from detent.realtime.watch import MOST_EVENTS, RecentLog
 from detent.ticks import MS
 
 
@@ -210,7 +210,7 @@ def test_the_journal_tells_what_was_done(cell: Control) -> None:
 
 
 def test_a_long_journal_forgets_its_beginning_and_counts_it() -> None:
-    log: Lately[int] = Lately(10)
+    log: RecentLog[int] = RecentLog(10)
     for n in range(100):
         log.append(n)
     assert list(log)[-10:] == list(range(90, 100))

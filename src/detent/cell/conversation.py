@@ -32,7 +32,7 @@ class Exchange:
     refused: list[Refused] = field(default_factory=list)
 
 
-class Witness(Recording):
+class Observer(Recording):
     """A recording that knows what was refused, and which axes are in motion; it keeps the rest if it is told to."""
 
     __slots__ = ("_conversation", "_keeps", "moving")
@@ -73,11 +73,11 @@ class Conversation:
         self._cell: Cell | None = None
         self._of_line: dict[int, list[Exchange]] = {}  # those that may still be answered
 
-    def attend(self, cell: Cell, *, keeps: bool) -> Witness:
+    def attend(self, cell: Cell, *, keeps: bool) -> Observer:
         """Listen to this cell from now on, in the place of its recording, which goes on if it `keeps` everything."""
-        witness = Witness(cell, self, keeps=keeps)
-        cell.recording, self._cell = witness, cell
-        return witness
+        observer = Observer(cell, self, keeps=keeps)
+        cell.recording, self._cell = observer, cell
+        return observer
 
     def typed(self, unit: str, text: str) -> None:
         """The host of a unit is about to send it a line: give it to `build`."""

@@ -99,7 +99,7 @@ def run(
         files.check(found.inputs, force=force)
         cell = build(found.description, found.read, record=bool(files.paths), line_timing=line_timing,
                      typed=conversation.typed)  # fmt: skip
-        witness = conversation.attend(cell, keeps=bool(files.paths))
+        observer = conversation.attend(cell, keeps=bool(files.paths))
         lines = [sending.addressed(cell, text) for text in send]
         if until is not None and until > cell.latest:
             raise Problem("", "--for", f"with a motor a cell runs for {show_duration(cell.latest)} at most")
@@ -111,7 +111,7 @@ def run(
         motors = outcome.motors(cell) if found.description.motors else []
     except (Oscillation, MotorError) as error:
         failed(error)
-    told = outcome.Outcome(cell, ended, conversation, course.sent, course.unsent, list(witness.moving), motors)
+    told = outcome.Outcome(cell, ended, conversation, course.sent, course.unsent, list(observer.moving), motors)
     try:
         exports.write(cell, found, files)
     except MotorError as error:

@@ -92,11 +92,11 @@ class Course:
 
     def _busy(self) -> bool:
         """Whether anything moves, a program runs, or something is still being said."""
-        from detent.cell.conversation import Witness
+        from detent.cell.conversation import Observer
         from detent.ticks import NEVER
 
         cell = self._cell
-        assert isinstance(cell.recording, Witness)
+        assert isinstance(cell.recording, Observer)
         if cell.recording.moving or any(line.deadline < NEVER for line in cell.lines):
             return True
         states = [unit.status(cell.now, axis).state for unit in cell.controllers().values() for axis in unit.axes]

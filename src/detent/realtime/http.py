@@ -41,7 +41,7 @@ SHORTEST_TOKEN: Final = 8  # characters
 TOKEN: Final = "DETENT_TOKEN"  # the variable of the environment
 
 
-class Doer(Protocol):
+class VerbHandler(Protocol):
     """Whoever does the verbs (`realtime.control.Control`)."""
 
     def ask(self, verb: str, given: Mapping[str, object]) -> "Future[Answer]":
@@ -65,7 +65,7 @@ class _Refused(Exception):
 class HttpControl:
     """Listens at `address` and answers in a thread of its own, until it is closed."""
 
-    def __init__(self, control: Doer, address: TcpAddress, token: str | None = None) -> None:
+    def __init__(self, control: VerbHandler, address: TcpAddress, token: str | None = None) -> None:
         """Raises EndpointError if the port cannot be had, or is open to others without a `token`, or that is short."""
         if token and len(token) < SHORTEST_TOKEN:
             raise EndpointError(f"--token or ${TOKEN}: it is too short; at least {SHORTEST_TOKEN} characters")
@@ -173,7 +173,7 @@ class _Client:
 class _Clients:
     """Who is connected, each a task that reads one request and writes one answer."""
 
-    def __init__(self, control: Doer, token: str) -> None:
+    def __init__(self, control: VerbHandler, token: str) -> None:
         self._control, self._token = control, token
         self._clients: dict[asyncio.Task[None], _Client] = {}  # the oldest first
         self._waiting = 0  # for the cell

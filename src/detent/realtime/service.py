@@ -29,7 +29,7 @@ from detent.realtime.images import Images
 from detent.realtime.loop import BEHIND, Loop, Timer, stopped_by_signals, wake_exactly
 from detent.realtime.pace import LatenessSummary, Pace
 from detent.realtime.waiting import Watched
-from detent.realtime.watch import Lately, Watch
+from detent.realtime.watch import RecentLog, Watch
 from detent.uart import Format
 
 T = TypeVar("T")
@@ -209,7 +209,7 @@ def models(description: Description) -> dict[str, str]:
 def _watch(cell: Cell, *, passes_on: bool) -> Watch:
     """A watch in the place of the recording of `cell`. The past is not kept, and of the journal what is recent."""
     watch = Watch(cell, passes_on=passes_on)
-    cell.recording, cell.journal = watch, Lately()
+    cell.recording, cell.journal = watch, RecentLog()
     for part in cell.parts:
         if isinstance(part, Mechanics):
             part.trace = None

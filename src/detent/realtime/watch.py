@@ -76,7 +76,7 @@ class Watch(Recording):
                 self.events.append((unit, entry))  # type: ignore[arg-type]  # those are the ones worth keeping
 
 
-class Lately(Log[T]):
+class RecentLog(Log[T]):
     """A log that forgets its beginning when it grows beyond twice `most`; `forgotten` counts."""
 
     __slots__ = ("forgotten", "most")
@@ -93,7 +93,7 @@ class Lately(Log[T]):
             self._items = self._items[self._size - self.most : self._size]
             self._size = self.most
 
-    def __deepcopy__(self, memo: object) -> "Lately[T]":
+    def __deepcopy__(self, memo: object) -> "RecentLog[T]":
         twin = super().__deepcopy__(memo)
         twin.most, twin.forgotten = self.most, self.forgotten
         return twin

@@ -5,7 +5,7 @@ import pytest
 from detent.lines.line import Heard
 from detent.realtime.endpoints.comport import ComPort
 from detent.realtime.endpoints.endpoint import MOST_WAITING
-from detent.realtime.endpoints.telnet import BINARY, BREAK, COM_PORT, DO, DONT, IAC, WILL, WONT, parameters, wish
+from detent.realtime.endpoints.telnet import BINARY, BREAK, COM_PORT, DO, DONT, IAC, WILL, WONT, negotiation, parameters
 from detent.uart import Char, Format, heard_as
 
 LINE = Format(9600, 7, "odd", 2)
@@ -33,7 +33,7 @@ def port() -> ComPort:
 
 
 def agreed(port: ComPort) -> ComPort:
-    port.receive(wish(WILL, COM_PORT) + wish(WILL, BINARY) + wish(DO, BINARY))
+    port.receive(negotiation(WILL, COM_PORT) + negotiation(WILL, BINARY) + negotiation(DO, BINARY))
     return port
 
 
@@ -123,19 +123,21 @@ def test_what_is_no_command_says_nothing_and_does_no_harm(port: ComPort, command
 
 
 def test_com_port_control_is_agreed_on_and_binary_is_offered_to_who_waits_for_that(port: ComPort) -> None:
-    _, answer = port.receive(wish(WILL, COM_PORT))
-    binary = wish(WILL, BINARY) + wish(DO, BINARY)
-    assert answer == wish(DO, COM_PORT) + binary + said(107, b"\xb0")
-    assert port.receive(wish(DO, BINARY) + wish(WILL, BINARY)) == ([], b""), "these are the answers"
+    _, answer = port.receive(negotiation(WILL, COM_PORT))
+    binary = negotiation(WILL, BINARY) + negotiation(DO, BINARY)
+    assert answer == negotiation(DO, COM_PORT) + binary + said(107, b"\xb0")
+    assert port.receive(negotiation(DO, BINARY) + negotiation(WILL, BINARY)) == ([], b""), "these are the answers"
 
 
 def test_who_asked_for_binary_before_is_not_asked_again(port: ComPort) -> None:
-    assert port.receive(wish(WILL, BINARY) + wish(DO, BINARY))[1] == wish(DO, BINARY) + wish(WILL, BINARY)
-    assert port.receive(wish(WILL, COM_PORT))[1] == wish(DO, COM_PORT) + said(107, b"\xb0")
+    assert port.receive(negotiation(WILL, BINARY) + negotiation(DO, BINARY))[1] == negotiation(
+        DO, BINARY
+    ) + negotiation(WILL, BINARY)
+    assert port.receive(negotiation(WILL, COM_PORT))[1] == negotiation(DO, COM_PORT) + said(107, b"\xb0")
 
 
 def test_other_options_are_refused(port: ComPort) -> None:
-    assert port.receive(wish(DO, 1) + wish(WILL, 31))[1] == wish(WONT, 1) + wish(DONT, 31)
+    assert port.receive(negotiation(DO, 1) + negotiation(WILL, 31))[1] == negotiation(WONT, 1) + negotiation(DONT, 31)
 
 
 def test_a_client_that_fits_says_and_hears_bytes(port: ComPort) -> None:

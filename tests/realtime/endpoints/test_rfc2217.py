@@ -16,7 +16,7 @@ from detent.lines.line import Heard
 from detent.realtime.endpoints.rfc2217 import QUIET, Rfc2217Port
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.endpoints.tcp import TcpAddress
-from detent.realtime.endpoints.telnet import COM_PORT, DO, DONT, ECHO, SUPPRESS_GO_AHEAD, WILL, parameters, wish
+from detent.realtime.endpoints.telnet import COM_PORT, DO, DONT, ECHO, SUPPRESS_GO_AHEAD, WILL, negotiation, parameters
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace
 from detent.realtime.service import Service
@@ -163,8 +163,8 @@ def test_a_client_that_sets_nothing_has_the_format_of_the_line(bench: Bench) -> 
 def test_a_line_that_echoes_asks_a_telnet_for_each_character_and_not_to_show_it() -> None:
     """RFC 857, 858: with both a telnet sends what is typed at once, and shows only what comes back."""
     bench = Bench(echoes=True)
-    assert bench.read(6) == wish(WILL, ECHO) + wish(WILL, SUPPRESS_GO_AHEAD)
-    bench.client.sendall(wish(DO, ECHO) + wish(DO, SUPPRESS_GO_AHEAD) + b" ")
+    assert bench.read(6) == negotiation(WILL, ECHO) + negotiation(WILL, SUPPRESS_GO_AHEAD)
+    bench.client.sendall(negotiation(DO, ECHO) + negotiation(DO, SUPPRESS_GO_AHEAD) + b" ")
     assert bench.read(1) == b" "
     bench.close()
 
@@ -172,7 +172,7 @@ def test_a_line_that_echoes_asks_a_telnet_for_each_character_and_not_to_show_it(
 def test_a_client_that_wants_no_echo_is_served_all_the_same() -> None:
     bench = Bench(echoes=True)
     bench.read(6)
-    bench.client.sendall(wish(DONT, ECHO) + wish(DONT, SUPPRESS_GO_AHEAD) + b"X\r")
+    bench.client.sendall(negotiation(DONT, ECHO) + negotiation(DONT, SUPPRESS_GO_AHEAD) + b"X\r")
     assert bench.read(2) == b"X\r"
     bench.close()
 

@@ -20,18 +20,18 @@ from detent.realtime.endpoints.telnet import (
     Data,
     Decoder,
     Item,
+    Negotiation,
     Options,
     Parameters,
-    Wish,
     escaped,
+    negotiation,
     parameters,
-    wish,
 )
 
 ITEMS = st.one_of(
     st.builds(Data, st.binary(min_size=1, max_size=9)),
     st.sampled_from([Command(BREAK), Command(241)]),
-    st.builds(Wish, st.sampled_from([WILL, WONT, DO, DONT]), st.integers(0, 255)),
+    st.builds(Negotiation, st.sampled_from([WILL, WONT, DO, DONT]), st.integers(0, 255)),
     st.builds(Parameters, st.integers(0, 254), st.binary(max_size=9)),
 )
 
@@ -42,8 +42,8 @@ def sent(item: Item) -> bytes:
             return escaped(data)
         case Command(code):
             return bytes((IAC, code))
-        case Wish(verb, option):
-            return wish(verb, option)
+        case Negotiation(verb, option):
+            return negotiation(verb, option)
         case Parameters(option, value):
             return parameters(option, value)
 
@@ -79,16 +79,16 @@ def test_no_bytes_are_too_strange_and_a_decoder_recovers(junk: bytes) -> None:
 
 
 def test_data_before_a_command_comes_before_it_and_what_is_behind_it_behind_it() -> None:
-    assert Decoder().feed(b"a" + wish(WILL, COM_PORT) + b"b" + b"\xff\xff") == [
+    assert Decoder().feed(b"a" + negotiation(WILL, COM_PORT) + b"b" + b"\xff\xff") == [
         Data(b"a"),
-        Wish(WILL, COM_PORT),
+        Negotiation(WILL, COM_PORT),
         Data(b"b\xff"),
     ]
 
 
 def test_a_subnegotiation_without_an_end_is_void_and_the_command_in_it_counts() -> None:
     assert Decoder().feed(bytes((IAC, SB, COM_PORT, 1, 2, IAC, WILL, BINARY)) + b"x") == [
-        Wish(WILL, BINARY),
+        Negotiation(WILL, BINARY),
         Data(b"x"),
     ]
     assert Decoder().feed(bytes((IAC, SB, 1, IAC)) + bytes((SB, COM_PORT, 7, IAC, SE))) == [Parameters(COM_PORT, b"\7")]
@@ -106,28 +106,28 @@ def test_of_a_subnegotiation_without_end_only_the_beginning_is_kept() -> None:
 @pytest.mark.parametrize(("asked", "agreed", "refused"), [(WILL, DO, DONT), (DO, WILL, WONT)])
 def test_what_is_accepted_is_agreed_on_once(asked: int, agreed: int, refused: int) -> None:
     options = Options(frozenset((BINARY,)))
-    assert options.answer(Wish(asked, BINARY)) == wish(agreed, BINARY)
-    assert options.answer(Wish(asked, BINARY)) == b"", "said already: an answer would go round for ever"
-    assert options.answer(Wish(asked, 1)) == wish(refused, 1)
+    assert options.answer(Negotiation(asked, BINARY)) == negotiation(agreed, BINARY)
+    assert options.answer(Negotiation(asked, BINARY)) == b"", "said already: an answer would go round for ever"
+    assert options.answer(Negotiation(asked, 1)) == negotiation(refused, 1)
     assert options.theirs | options.ours == {BINARY}
 
 
 @pytest.mark.parametrize(("yes", "no", "denial"), [(WILL, WONT, DONT), (DO, DONT, WONT)])
 def test_an_option_can_be_taken_back(yes: int, no: int, denial: int) -> None:
     options = Options(frozenset((BINARY,)))
-    options.answer(Wish(yes, BINARY))
-    assert options.answer(Wish(no, BINARY)) == wish(denial, BINARY)
-    assert options.answer(Wish(no, BINARY)) == b""
+    options.answer(Negotiation(yes, BINARY))
+    assert options.answer(Negotiation(no, BINARY)) == negotiation(denial, BINARY)
+    assert options.answer(Negotiation(no, BINARY)) == b""
     assert not options.theirs | options.ours
 
 
 def test_the_answer_to_an_offer_is_not_answered() -> None:
     options = Options(frozenset((BINARY,)))
-    assert options.offer(WILL, BINARY) == wish(WILL, BINARY)
+    assert options.offer(WILL, BINARY) == negotiation(WILL, BINARY)
     assert options.offer(WILL, BINARY) == b""
-    assert options.answer(Wish(DO, BINARY)) == b""
+    assert options.answer(Negotiation(DO, BINARY)) == b""
     assert options.ours == {BINARY}
     assert options.offer(WILL, BINARY) == b""
-    assert options.offer(DO, BINARY) == wish(DO, BINARY)
-    assert options.answer(Wish(WONT, BINARY)) == b""
+    assert options.offer(DO, BINARY) == negotiation(DO, BINARY)
+    assert options.answer(Negotiation(WONT, BINARY)) == b""
     assert options.theirs == set()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from detent.cell.actions import Action, TimedAction
 from detent.cell.cell import Cell
-from detent.realtime.watch import Lately
+from detent.realtime.watch import RecentLog
 from detent.ticks import Ns
 
 MOST_ACTIONS = 4_000  # kept
@@ -33,7 +33,7 @@ class Past:
 
     def __init__(self, cell: Cell, counts: Callable[[], tuple[int, ...]]) -> None:
         self.cell, self._counts = cell, counts
-        cell.journal, cell.journaling = Lately(MOST_ACTIONS), True
+        cell.journal, cell.journaling = RecentLog(MOST_ACTIONS), True
         self.moments: list[Moment] = []
 
     def keep(self) -> Moment:

@@ -84,7 +84,7 @@ class ComPort:
                     chars += self._said(text)
                 case telnet.Command(telnet.BREAK):
                     chars.append(break_as(self._line))
-                case telnet.Wish():
+                case telnet.Negotiation():
                     answer += self._agree(item)
                 case telnet.Parameters(telnet.COM_PORT, value) if value:
                     if value[0] == Asked.SET_CONTROL and value[1:] == bytes((_BREAK + 1,)) and not self._lines[_BREAK]:
@@ -109,7 +109,7 @@ class ComPort:
         self._behind_cr = text.endswith(b"\r")
         return text.replace(_CR_NUL, b"\r")
 
-    def _agree(self, asked: telnet.Wish) -> bytes:
+    def _agree(self, asked: telnet.Negotiation) -> bytes:
         options = self._options
         answer = options.answer(asked)
         if asked == (telnet.WILL, telnet.COM_PORT) and answer:  # some clients wait for the server to ask for the rest

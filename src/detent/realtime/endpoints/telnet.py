@@ -27,7 +27,7 @@ class Command(NamedTuple):
     code: int
 
 
-class Wish(NamedTuple):
+class Negotiation(NamedTuple):
     """`verb` (WILL, WONT, DO, DONT) about an option."""
 
     verb: int
@@ -41,7 +41,7 @@ class Parameters(NamedTuple):
     value: bytes
 
 
-Item: TypeAlias = Data | Command | Wish | Parameters
+Item: TypeAlias = Data | Command | Negotiation | Parameters
 
 
 def escaped(data: bytes) -> bytes:
@@ -49,8 +49,8 @@ def escaped(data: bytes) -> bytes:
     return data.replace(_IAC, _IAC + _IAC)
 
 
-def wish(verb: int, option: int) -> bytes:
-    """A wish as it is sent."""
+def negotiation(verb: int, option: int) -> bytes:
+    """A negotiation as it is sent."""
     return bytes((IAC, verb, option))
 
 
@@ -103,7 +103,7 @@ class Decoder:
                 return self._command(value, text)
             case _In.WISH:
                 self._in = _In.DATA
-                return Wish(self._verb, value)
+                return Negotiation(self._verb, value)
             case _In.PARAMETERS if value != IAC:
                 self._keep(value)
             case _In.PARAMETERS:
@@ -144,18 +144,18 @@ class Options:
         self._accepted = accepted
         self.ours: set[int] = set()  # we do
         self.theirs: set[int] = set()  # the other side does
-        self._offered: set[tuple[int, int]] = set()  # wishes of ours without an answer
+        self._offered: set[tuple[int, int]] = set()  # negotiations of ours without an answer
 
     def offer(self, verb: int, option: int) -> bytes:
-        """Wish for an option by WILL or DO: the bytes to send, none if that was said already."""
+        """Ask for an option by WILL or DO: the bytes to send, none if that was said already."""
         agreed = self.ours if verb == WILL else self.theirs
         if option in agreed or (verb, option) in self._offered:
             return b""
         self._offered.add((verb, option))
-        return wish(verb, option)
+        return negotiation(verb, option)
 
-    def answer(self, asked: Wish) -> bytes:
-        """The answer to a wish of the other side; none if it was one itself, or changes nothing."""
+    def answer(self, asked: Negotiation) -> bytes:
+        """The answer to a negotiation of the other side; none if it was one itself, or changes nothing."""
         verb, option = asked
         of_theirs = verb in (WILL, WONT)
         agreed = self.theirs if of_theirs else self.ours
@@ -166,10 +166,10 @@ class Options:
             if option in agreed:
                 return b""
             if option not in self._accepted:
-                return wish(no, option)
+                return negotiation(no, option)
             agreed.add(option)
-            return b"" if offered else wish(yes, option)
+            return b"" if offered else negotiation(yes, option)
         if option not in agreed:
             return b""
         agreed.discard(option)
-        return wish(no, option)
+        return negotiation(no, option)
