@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from tests.workbench.patience import PATIENCE
+from tests.workbench.told import alone
 
 from detent.cell.build import build
 from detent.cell.cell import Cell
@@ -19,11 +20,14 @@ from detent.hosts.errors import DriverError
 from detent.hosts.genstepper import BlockingGenStepper, GenStepper
 from detent.hosts.gsc200 import BlockingGsC200, GsC200
 from detent.hosts.supersigma import BlockingSupersigma, Supersigma
+from detent.realtime.connect import HOSTS
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.service import Service
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
+from detent.workbench.messages import EndpointPicture
 from detent.workbench.stopping import StopFailed, Stopping
+from detent.workbench.units import beside
 from detent.workbench.units.asked import look
 from detent.workbench.units.registry import Units
 from detent.workbench.units.unit import UnitBusy, options_of
@@ -315,3 +319,15 @@ def test_a_port_that_is_lost_shows_at_once_and_is_spoken_to_only_when_asked(tmp_
                 writer.close()
 
     at_desk(tmp_path, scene)
+
+
+@pytest.mark.parametrize("model", DRIVERS)
+def test_every_model_of_a_cell_can_be_connected_to_as_its_host_does(model: str) -> None:
+    told = alone(model)
+    line = next(iter(told.picture.lines.values()))
+    served = line._replace(endpoints=(EndpointPicture("pty", "/tmp/port"),))
+    found = beside.emulated(told.picture._replace(lines={line.name: served}))
+    assert {one.model for one in found} == {model}
+    for one in found:
+        assert one.address == "/tmp/port"
+        assert set(options_of(one.options)) <= {*HOSTS[model].options, "baud"}

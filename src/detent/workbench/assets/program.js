@@ -35,6 +35,7 @@ class Program {
       tab.addEventListener("click", () => this.turnTo(tab.dataset.unit));
     for (const key of root.querySelectorAll("[data-key]"))
       key.addEventListener("click", () => this.press(() => this.actions[key.dataset.key]()));
+    find(".program-commands input").addEventListener("input", () => this.facts && this.commands());
     find("[value=cancel]").addEventListener("click", () => this.at.dialog.close());
   }
 
@@ -121,11 +122,33 @@ class Program {
     this.different = [];
     this.ahead = false;
     this.editor.speak(facts);
+    this.commands();
     this.editor.set(draft ? draft.text : facts.source);
     this.editor.breakAt([]);
     this.say("");
     this.name();
     await this.check();
+  }
+
+  /* The commands of the unit that say what is searched for. */
+  commands() {
+    const box = this.root.querySelector(".program-commands"),
+      wanted = box.querySelector("input").value.toLowerCase().split(/\s+/).filter(Boolean),
+      rows = [...new Map(this.facts.words.flatMap((word) => word.rows).map((row) => [JSON.stringify(row), row])).values()],
+      found = rows.filter((row) => wanted.every((word) => [row.form, row.takes, row.what, row.section].join(" ").toLowerCase().includes(word)));
+    box.querySelector("table").replaceChildren(
+      ...found.map((row) => {
+        const made = document.createElement("tr");
+        for (const [kind, text] of [["mono", row.form], ["", `${row.what}${row.takes && !/^no/.test(row.takes) ? ` Takes ${row.takes}.` : ""}`], ["quiet", row.section]]) {
+          const cell = document.createElement("td");
+          cell.className = kind;
+          cell.textContent = text;
+          made.append(cell);
+        }
+        return made;
+      }),
+    );
+    if (!found.length) box.querySelector("table").append("No command says that.");
   }
 
   changed(typed) {

@@ -1,9 +1,10 @@
 // The page Unit: the unit that is chosen, filled into the markup of detent/workbench/pages/unit.py.
 
+import { holding } from "./holding.js";
+
 const { part, on, get, call, meant, make, toast, remembered, remember, seconds, grouped } = window.detent;
 
 const MOST = 800; // rows on the page
-const HELD = 300; // ms between two words that a key is held
 const ARMED = 3000; // ms in which a second click is a yes
 
 part("unit", (box) => {
@@ -17,7 +18,6 @@ part("unit", (box) => {
   let asking = false;
   let again = false;
   let armed = null;
-  let holding = 0;
   let seen = "";
 
   const names = () => get("r.names") || [];
@@ -84,7 +84,7 @@ part("unit", (box) => {
   }
 
   function choose(name) {
-    letGo();
+    held.letGo();
     disarm();
     chosen = name;
     if (name !== null) remember("unit", name);
@@ -258,67 +258,22 @@ part("unit", (box) => {
   role("stop").addEventListener("click", () => stopped(call("unit_stop", chosen)));
 
   async function stopped(stopping) {
-    letGo(false);
+    held.letGo(false);
     const told = await tried(() => stopping);
     if (told) role("sent").textContent = told;
   }
 
-  function letGo(stop = true) {
-    if (!holding) return;
-    clearInterval(holding);
-    holding = 0;
-    for (const one of all("[data-hold]")) one.classList.remove("down");
-    if (stop) stopped(call("unit_stop", chosen));
-  }
-
-  async function hold(button) {
-    const speed = Number(role("speed").value);
-    if (holding || button.disabled) return;
-    if (!(speed > 0)) {
+  const held = holding(all("[data-hold]"), {
+    name: () => chosen,
+    rate: (button) => {
+      const speed = Number(role("speed").value);
+      if (speed > 0) return speed * Number(button.dataset.hold);
       toast("Write a rate first.", "error");
-      return;
-    }
-    button.classList.add("down");
-    const name = chosen;
-    holding = setInterval(() => call("unit_held", name).catch(() => {}), HELD);
-    try {
-      const sent = await call("unit_hold", name, speed * Number(button.dataset.hold));
-      if (holding) role("sent").textContent = `sent ${sent.join(", ")}`;
-    } catch (error) {
-      const was = holding;
-      letGo(false);
-      if (was) toast(error.message, "error");
-    }
-  }
-
-  for (const button of all("[data-hold]")) {
-    button.addEventListener("pointerdown", (event) => {
-      if (event.button !== 0) return;
-      try {
-        button.setPointerCapture(event.pointerId);
-      } catch {
-        /* a pointer that is gone already */
-      }
-      hold(button);
-    });
-    for (const end of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(end, () => letGo());
-    button.addEventListener("contextmenu", (event) => event.preventDefault());
-    button.addEventListener("keydown", (event) => {
-      if (event.key !== " " && event.key !== "Enter") return;
-      event.preventDefault();
-      if (!event.repeat) hold(button);
-    });
-    button.addEventListener("keyup", (event) => {
-      if (event.key === " " || event.key === "Enter") letGo();
-    });
-  }
-  const away = () => letGo();
-  const hidden = () => document.hidden && letGo();
-  const noMore = () => letGo(false);
-  addEventListener("blur", away);
-  addEventListener("pagehide", away);
-  document.addEventListener("visibilitychange", hidden);
-  document.addEventListener("detent-stop", noMore);
+      return null;
+    },
+    sent: (lines) => (role("sent").textContent = `sent ${lines.join(", ")}`),
+    stopped,
+  });
 
   // -- the line --
 
@@ -492,11 +447,7 @@ part("unit", (box) => {
   tabs();
   if (chosen === null) choose(null);
   return () => {
-    letGo();
+    held.end();
     ends.forEach((end) => end());
-    removeEventListener("blur", away);
-    removeEventListener("pagehide", away);
-    document.removeEventListener("visibilitychange", hidden);
-    document.removeEventListener("detent-stop", noMore);
   };
 });

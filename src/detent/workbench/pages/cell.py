@@ -11,6 +11,7 @@ from detent.realtime.verbs import FAULTS, VERBS
 from detent.workbench.icons import icon
 from detent.workbench.messages import LinePicture, MotorPicture, Picture, PinPicture, SwitchPicture, UnitPicture
 from detent.workbench.pages import Page, Window
+from detent.workbench.units.beside import emulated
 
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 TURN = 200  # steps of a turn of the dial where no motor is fitted that would say
 
 LONGEST_ADDRESS = 28  # characters that fit a panel
+
+MANY = 5  # units of a cell whose panels are compact until somebody says otherwise
 
 DRIVES = ("output", "open collector", "winding")
 
@@ -49,10 +52,15 @@ def markup(picture: Picture) -> str:
     cards = "".join(_unit(picture, unit, jacks) for unit in picture.units.values())
     cards += "".join(_loose_motor(picture, motor, jacks) for motor in loose)
     wires = json.dumps([[wire.source, list(wire.targets)] for wire in picture.wires])
+    count = len(picture.units) + len(loose)
+    compact = f"""<div class="cell-tools"><button class="key small" data-part="compact" data-units="{count}"
+ data-many="{MANY}" aria-pressed="false" data-help="Small panels without pins, straps and wires, or all of it">Compact
+</button></div>"""
     return (
+        f"{compact}"
         f'<div class="cell{" with-panel" if panel else ""}" data-part="wires" data-wires="{escape(wires)}">'
         f'<svg class="wires" aria-hidden="true"></svg>{_panel(panel) if panel else ""}'
-        f'<div class="units" style="--count:{max(1, len(picture.units) + len(loose))}">{cards}</div></div>'
+        f'<div class="units" style="--count:{max(1, count)}">{cards}</div></div>'
         f"{_breaking(picture)}"
     )
 
@@ -148,7 +156,8 @@ def _axis(picture: Picture, unit: UnitPicture, axis: str, jacks: set[str]) -> st
 <b data-live="{place}.pulses" data-form="count" data-help="Step pulses given since the cell began"></b>
 <small>pulses</small></span>{_rotor(motor)}</div>"""
     pins = _motor_pins(picture, motor, jacks) if motor is not None else ""
-    return f'<div class="axis">{dial}{readout}</div>{_slide(unit.name, axis, motor, switches)}{pins}'
+    slide = _slide(unit.name, axis, motor, switches)
+    return f'<div class="axis">{dial}{readout}</div>{slide}{pins}{_manual(picture, unit, axis, motor)}'
 
 
 def _dial(key: str, turn: float, motor: MotorPicture | None) -> str:
@@ -191,6 +200,48 @@ def _slide(unit: str, axis: str, motor: MotorPicture | None, switches: Iterable[
         for s in switches
     )
     return f'<div class="slide" data-part="slide" data-facts="{escape(json.dumps(facts))}"></div>{contacts}'
+
+
+def _manual(picture: Picture, unit: UnitPicture, axis: str, motor: MotorPicture | None) -> str:
+    """What a hand does with an axis: the host of its line says it in the unit's own commands, which are shown."""
+    name = f"{unit.name} {axis}".strip()
+    host = next((one for one in emulated(picture) if one.name == name), None)
+    if host is None:
+        return ""
+    lead = motor.lead if motor is not None else None
+    facts = {**host._asdict(), "lead": lead}
+    title = escape(name)
+    measure = (
+        f"""<select class="field" data-role="measure" aria-label="Unit of length of {title}"><option>mm</option>
+<option>°</option><option value="">steps</option></select>"""
+        if lead is not None
+        else '<span class="quiet">steps</span>'
+    )
+
+    def keys(kind: str, minus: str, plus: str, what: str) -> tuple[str, str]:
+        made = [
+            f'<button type="button" class="key small{" hold" * (kind == "hold")}" data-{kind}="{sign}" '
+            f'aria-label="{what} {word} of {title}">{text}</button>'
+            for sign, word, text in ((-1, "minus", minus), (1, "plus", plus))
+        ]
+        return made[0], made[1]
+
+    jog, hold, home = (
+        keys("jog", "&minus;", "+", "Jog"),
+        keys("hold", "&#9664;", "&#9654;", "Hold"),
+        keys("home", "&#8676; home", "home &#8677;", "Home"),
+    )
+    return f"""<details class="manual" data-part="manual" data-facts="{escape(json.dumps(facts))}">
+<summary>Manual control</summary><div class="row wrap">{jog[0]}<input class="field num" data-role="by" type="number" step="any"
+ value="100" aria-label="Distance or position of {title}">{measure}{jog[1]}
+<button type="button" class="key small" data-role="go" aria-label="Go to, {title}">Go to</button>
+<button type="button" class="key small" data-role="zero" aria-label="Set zero, {title}"
+ data-help="Where the axis stands is 0 from then on">Set zero</button>
+<button type="button" class="key small stop" data-role="stop" aria-label="STOP {title}"
+ data-help="By its ramp; again: at once. Esc twice stops everything.">STOP</button></div>
+<div class="row wrap">{hold[0]}<input class="field num" data-role="rate" type="number" min="0" step="any" value="200"
+ aria-label="Rate of {title} while a key is held"><span class="quiet">/s, held</span>{hold[1]}{home[0]}{home[1]}</div>
+<div class="sent mono" data-role="sent" aria-live="polite"></div></details>"""
 
 
 def _motor_pins(picture: Picture, motor: MotorPicture, jacks: set[str]) -> str:
@@ -299,4 +350,6 @@ def _args(*values: object) -> str:
     return escape(json.dumps(values))
 
 
-PAGE = Page("Cell", "/", "cell", build, scripts=("wires.js", "cell.js", "breaking.js"), styles=("cell.css",))
+PAGE = Page(
+    "Cell", "/", "cell", build, scripts=("wires.js", "cell.js", "manual.js", "breaking.js"), styles=("cell.css",)
+)

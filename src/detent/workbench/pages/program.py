@@ -127,6 +127,9 @@ def _page(units: "Sequence[UnitPicture]") -> str:
       <span class="program-stop quiet" data-live="why"></span></p>
   </div>
   {"".join(map(_watch, units))}
+  <details class="panel program-box program-commands"><summary>Commands</summary>
+    <input class="field" type="search" aria-label="Search the commands" placeholder="letter, word, section">
+    <div class="scroll-x" tabindex="0" role="group" aria-label="Commands found"><table></table></div></details>
 </aside>
 <dialog class="panel program-dialog" aria-labelledby="program-dialog-title"><form method="dialog">
   <h2 id="program-dialog-title"></h2>

@@ -50,7 +50,8 @@ def _options(picture: Picture, unit: UnitPicture, line: LinePicture) -> str:
         straps = {**pins.DEFAULT_STRAPS, **unit.straps}
         number = pins.address(straps)
         words += ["checksums=no"] * (straps["CHS"] != HIGH) + [f"address={number}"] * (number is not None)
-        words += [f"revision={chosen['revision']}"] * ("revision" in chosen)
+        if "revision" in chosen:
+            words.append(f"revision={chosen['revision']}")
     if "drive" in known:
         words.append(f"drive={chosen['number']}")
     if "mode" in known:

@@ -46,6 +46,7 @@ class Units:
         """Backups are read and written in `folder`; what a restore replaces is kept below `state`."""
         self._live, self._stopping, self._folder, self._state = live, stopping, folder, state
         self._units: dict[str, Unit] = {}
+        self._connecting = asyncio.Lock()  # two clicks are one connection
         self._turning = asyncio.Lock()  # the last word counts, not the last to be done
         live.put({"r.names": []})
         for call in (self.unit_connect, self.unit_again, self.unit_leave, self.unit_say, self.unit_both, self.unit_move,
@@ -59,8 +60,12 @@ class Units:
     async def unit_connect(self, model: Name, address: Name, options: Line = "", name: Name = "") -> str:
         """Connect to a unit and look at it from now on; how it is called. Raises ValueError, PortError."""
         name = name or " ".join(word for word in (model, address, options) if word)
-        if name in self._units:
-            return name
+        async with self._connecting:
+            if name not in self._units:
+                await self._connect(name, model, address, options)
+        return name
+
+    async def _connect(self, name: str, model: str, address: str, options: str) -> None:
         if len(self._units) >= MOST:
             raise ValueError(f"{MOST} units are connected: leave one of them first")
         beside = next((unit for unit in self._units.values() if unit.address == address), None)
@@ -70,7 +75,6 @@ class Units:
         self._tell(unit)
         self._live.put({"r.names": list(self._units)})
         unit.begin()
-        return name
 
     async def unit_again(self, name: Name) -> None:
         """After the port was lost, or the unit did not answer."""

@@ -1,0 +1,79 @@
+// A key that is held: the axis runs as long as it is, and stops when it is let go, or its window is out of sight.
+
+const { call, toast } = window.detent;
+const HELD = 300; // ms between two words that a key is held
+
+/** Make `buttons` run the unit `name()` at `rate(button)`, in steps/s with its sign, null for a rate that is none.
+ *
+ *  `sent(lines)` is told what was sent, `stopped(promise)` of the stop when the key is let go. Returns {letGo, end}:
+ *  `letGo(stop)` lets go of a key that is held, and stops the axis unless `stop` is false; `end` is for the end of the page.
+ */
+export function holding(buttons, { name, rate, sent, stopped }) {
+  let timer = 0;
+  let held = "";
+
+  function letGo(stop = true) {
+    if (!timer) return;
+    clearInterval(timer);
+    timer = 0;
+    for (const one of buttons) one.classList.remove("down");
+    if (stop) stopped(call("unit_stop", held));
+  }
+
+  async function hold(button) {
+    if (timer || button.disabled) return;
+    const speed = rate(button);
+    if (speed === null) return;
+    button.classList.add("down");
+    held = name();
+    const mine = (timer = setInterval(() => call("unit_held", held).catch(() => {}), HELD));
+    try {
+      const lines = await call("unit_hold", held, speed);
+      if (timer === mine) sent(lines);
+    } catch (error) {
+      if (timer !== mine) return;
+      letGo(false);
+      toast(error.message, "error");
+    }
+  }
+
+  for (const button of buttons) {
+    button.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      try {
+        button.setPointerCapture(event.pointerId);
+      } catch {
+        /* a pointer that is gone already */
+      }
+      hold(button);
+    });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(end, () => letGo());
+    button.addEventListener("contextmenu", (event) => event.preventDefault());
+    button.addEventListener("keydown", (event) => {
+      if (event.key !== " " && event.key !== "Enter") return;
+      event.preventDefault();
+      event.stopPropagation(); // a space is the key's, and does not pause the cell
+      if (!event.repeat) hold(button);
+    });
+    button.addEventListener("keyup", (event) => {
+      if (event.key === " " || event.key === "Enter") letGo();
+    });
+  }
+  const away = () => letGo();
+  const hidden = () => document.hidden && letGo();
+  const noMore = () => letGo(false); // STOP does it
+  addEventListener("blur", away);
+  addEventListener("pagehide", away);
+  document.addEventListener("visibilitychange", hidden);
+  document.addEventListener("detent-stop", noMore);
+  return {
+    letGo,
+    end() {
+      letGo();
+      removeEventListener("blur", away);
+      removeEventListener("pagehide", away);
+      document.removeEventListener("visibilitychange", hidden);
+      document.removeEventListener("detent-stop", noMore);
+    },
+  };
+}

@@ -1,0 +1,113 @@
+// Manual control of the axes of the page Cell: what is clicked is said to the unit by its host, in the unit's own commands.
+
+import { holding } from "./holding.js";
+
+const { part, on, get, call, toast, remembered, remember } = window.detent;
+
+part("manual", (box) => {
+  const facts = JSON.parse(box.dataset.facts);
+  const name = `${facts.name} (cell)`; // as the page Unit calls it, too
+  const role = (one) => box.querySelector(`[data-role="${one}"]`);
+  const measure = role("measure");
+  if (measure) measure.value = remembered(`measure.${facts.name}`) || "mm";
+  /** Steps in one unit of what is written. */
+  const scale = () => (measure && measure.value ? 1 / facts.lead : 1);
+
+  function number(field) {
+    const value = Number(field.value);
+    if (field.value !== "" && Number.isFinite(value)) return value;
+    toast("Write a number first.", "error");
+    field.focus();
+    return null;
+  }
+
+  /** The unit, with a host that speaks to it: connected to at the first touch. */
+  async function there() {
+    if (get("held") && !get("real")) throw new Error("The cell stands, and its unit cannot answer: let time go on first.");
+    return call("unit_connect", facts.model, facts.address, facts.options, name);
+  }
+
+  const say = (text) => (role("sent").textContent = text);
+  const told = (lines) => say(lines.length ? `sent ${lines.join(", ")}` : "nothing had to be sent");
+
+  async function move(what, value = 0) {
+    try {
+      await there();
+      told(await call("unit_move", name, what, value));
+    } catch (error) {
+      toast(error.message, "error");
+    }
+  }
+
+  async function stopped(stopping) {
+    hold.letGo(false);
+    try {
+      say(await stopping);
+    } catch (error) {
+      toast(error.message, "error");
+    }
+  }
+
+  for (const button of box.querySelectorAll("[data-jog]")) button.addEventListener("click", () => {
+    const by = number(role("by"));
+    if (by !== null) move("jog", Math.round(by * scale()) * Number(button.dataset.jog));
+  });
+  role("go").addEventListener("click", () => {
+    const to = number(role("by"));
+    if (to !== null) move("go", Math.round(to * scale()));
+  });
+  role("zero").addEventListener("click", () => move("zero"));
+  for (const button of box.querySelectorAll("[data-home]")) button.addEventListener("click", () => move("home", Number(button.dataset.home)));
+  role("stop").addEventListener("click", () => stopped(there().then(() => call("unit_stop", name))));
+  const hold = holding([...box.querySelectorAll("[data-hold]")], {
+    name: () => name,
+    rate: (button) => {
+      if (!get(`r.${name}`)) {
+        there().then(() => toast("Connected: hold the key once more."), (error) => toast(error.message, "error"));
+        return null;
+      }
+      const by = number(role("rate"));
+      return by === null ? null : by * scale() * Number(button.dataset.hold);
+    },
+    sent: told,
+    stopped,
+  });
+  measure?.addEventListener("change", () => remember(`measure.${facts.name}`, measure.value));
+
+  function show(facts) {
+    if (!facts) return;
+    const busy = Boolean(facts.job || facts.lost || facts.stopping);
+    for (const one of box.querySelectorAll("[data-jog], [data-role=go], [data-role=zero]")) one.disabled = busy;
+    for (const one of box.querySelectorAll("[data-home]")) {
+      one.disabled = busy || facts.can.home !== "";
+      one.dataset.help = facts.can.home || `Search for home, ${one.dataset.home < 0 ? "minus" : "plus"}. ${facts.can.before_home}`;
+    }
+    for (const one of box.querySelectorAll("[data-hold]")) {
+      one.disabled = facts.can.hold !== "" || (busy && !facts.held);
+      one.dataset.help = facts.can.hold || `Runs as long as the key is held. ${facts.can.before_hold}`;
+    }
+    const why = facts.lost || facts.trouble;
+    if (why) say(why);
+  }
+  const ends = on(`r.${name}`, (key, value) => key === `r.${name}` && show(value));
+  return () => {
+    hold.end();
+    ends();
+  };
+});
+
+part("compact", (button) => {
+  const cell = document.querySelector(".cell");
+  const chosen = remembered("compact");
+  const many = Number(button.dataset.units) >= Number(button.dataset.many);
+  const set = (on) => {
+    cell.classList.toggle("compact", on);
+    button.setAttribute("aria-pressed", on ? "true" : "false");
+  };
+  set(chosen === null ? many : chosen === "yes");
+  button.addEventListener("click", () => {
+    const on = !cell.classList.contains("compact");
+    remember("compact", on ? "yes" : "no");
+    set(on);
+  });
+});
