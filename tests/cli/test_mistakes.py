@@ -118,6 +118,9 @@ wiring --motor 123 |
 docs nowhere at all |
 epics gs-c20 |
 epics {missing}.toml |
+epics gs-c200 --prefix a.b | letters, digits
+epics gs-c200 --ca-port 70000 | 1 to 65535
+epics gs-c200 --list-pvs --max-velocity 0x | max-velocity
 boards chek |
 service {missing}.toml |
 """

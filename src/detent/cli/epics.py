@@ -3,6 +3,7 @@
 import asyncio
 import json as json_text
 import os
+import re
 import sys
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
@@ -23,6 +24,8 @@ _SETTINGS = {
     "max-velocity": "most", "acceleration": "acceleration",
 }  # fmt: skip
 """The options that say how a record begins, and what `Settings` calls them."""
+
+PREFIX = r"[A-Za-z0-9_:+\[\]<>;-]{0,50}"  # of a record's name, which has 60 characters at most
 
 Each = Annotated[Sequence[str], Parameter(negative=())]
 
@@ -118,6 +121,9 @@ def epics(
     try:
         if target is None:
             raise Problem("", "", "say what to serve: a model like gs-c200 (detent models), or a CELL.toml")
+        if not re.fullmatch(PREFIX, prefix):
+            what = "a record's name has letters, digits and _ - + : [ ] < > ;, and 60 of them at most"
+            raise Problem("", "--prefix", f"{prefix!r}: {what}")
         if ca_port is not None:
             if not 0 < ca_port < 65536:
                 raise Problem("", "--ca-port", f"{ca_port} is no port; it takes 1 to 65535")

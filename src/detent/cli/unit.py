@@ -135,7 +135,7 @@ def _another(error: "DriverError", port: str) -> str:
     """What may be there in the unit's place, where nothing that it says was heard."""
     from detent.hosts.errors import BadAnswer, NoAnswer
 
-    if not isinstance(error, BadAnswer | NoAnswer):
+    if not isinstance(error, BadAnswer | NoAnswer) or "--no-checksum" in error.what:
         return ""
     if error.spoken is not None and error.spoken.echoed:
         return "" if error.unit.startswith("DCB-274") else f"; a DCB-274 echoes, too: detent find {port}"
