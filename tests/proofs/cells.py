@@ -35,7 +35,8 @@ BY_NAME: Final = {model.name: model for model in MODELS}
 ALONE: Final = tuple(BY_NAME)
 ASIDE: Final = ("step-detector", "phase-reversal")  # units without a line
 ACTIONS: Final = 25
-MOST_EVENTS: Final = 60_000  # in a second, for each unit
+MOST_EVENTS: Final = 70_000  # in a second, for each unit: a loop of wires through a board may swing at its every tick
+ENOUGH: Final = 100_000  # events of a case: it ends there
 _ADDRESS: Final = re.compile(r" at 0x[0-9a-f]+")
 
 
@@ -136,6 +137,10 @@ def _in_words(error: Exception) -> bool:
     return type(error) in known and isinstance(found, str) and " " in found
 
 
+class Enough(Exception):
+    """A cell has done so much that the case ends."""
+
+
 class Hands:
     """Does things to a cell, drawn from `draw`; the same things to another that is in the same state."""
 
@@ -166,8 +171,10 @@ class Hands:
                 break
             cell.run_to(at)
             self.events += 1
-            most = 200_000 + len(cell.wiring.names) * MOST_EVENTS * (cell.now // SECOND + 1)
+            most = 2_000 + 100 * ACTIONS + len(cell.wiring.names) * (MOST_EVENTS * cell.now // SECOND)
             assert self.events <= most, f"{self.events} events in {cell.now} ns"
+            if self.events > ENOUGH:
+                raise Enough
         cell.run_to(until)
 
     def _deed(self) -> Callable[[], object]:
@@ -265,16 +272,18 @@ def check(number: int, tally: Tally, actions: int = ACTIONS) -> None:
     except Oscillation:
         oscillates = True
         tally.refused += 1
+    except Enough:
+        oscillates = True
     tally.events += hands.events
     if oscillates:
-        return  # such a cell is no longer whole, and its owner is told
+        return  # such a cell is no longer whole, and its owner is told; or all of it would take too long again
     told = recorded(cell)
     if twin is not None:
         other = Hands(twin, draw, Tally())
         draw.setstate(state)
         for _ in range(cut, actions):
             other.act()
-        other.go_to(twin.now + SECOND)
+        other.go_to(twin.now + SECOND)  # it does no more than the first, which was not too much
         assert recorded(twin) == told, "a copy goes on otherwise"
         tally.copies += 1
     again = made(planned, tuple(cell.journal))

@@ -10,6 +10,7 @@ import sys
 from detent.cell.description import Problem
 from detent.realtime.endpoints.endpoint import EndpointError
 from detent.realtime.images import ImagesUnusable
+from detent.realtime.polling import allow_many
 from detent.workbench.engine import Engine
 from detent.workbench.joining import joined
 from detent.workbench.messages import Failed, Order
@@ -36,6 +37,7 @@ def _read_order(end: socket.socket) -> Order | None:
 
 def main(words: list[str]) -> int:
     """Open what the first message on the pipe orders, and serve it until the pipe ends."""
+    allow_many()
     end = joined(words)
     order = _read_order(end)
     if order is None:
