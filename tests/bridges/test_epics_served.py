@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -269,19 +268,16 @@ def test_a_unit_at_a_port_is_moved_too(ioc: Ioc) -> None:
     """Real or emulated is one to the driver: here the port is a pseudo-terminal."""
     environment = {**ioc.environment, "EPICS_CA_SERVER_PORT": str(free_port())}
     with Service(single("gs-c200s"), lambda file: "", [EndpointSpec("pty")], pace=20) as service:
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
-            with running(["gs-c200s", service.endpoints[0].address, "--json"], environment) as other:
-                told = other.client("""
+        with (
+            service.in_thread(),
+            running(["gs-c200s", service.endpoints[0].address, "--json"], environment) as other,
+        ):
+            told = other.client("""
 import json
 from caproto.sync.client import read, write
 write("SIM:m1", -25, notify=True, timeout=60, repeater=False)
 print(json.dumps({"RBV": float(read("SIM:m1.RBV", repeater=False).data[0])}))
 """)
-        finally:
-            service.stop()
-            serving.join()
         assert told == {"RBV": -25}
         assert service.cell.controller("gs-c200s").status(service.cell.now).position == -25
 

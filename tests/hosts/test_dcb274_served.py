@@ -24,14 +24,11 @@ PARTY = "".join(
 
 @contextmanager
 def served(text: str, pace: int = 20) -> Iterator[str]:
-    with Service(parse(text, "cell"), lambda file: "", [EndpointSpec("pty")], pace=pace) as service:
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
-            yield service.endpoints[0].address
-        finally:
-            service.stop()
-            serving.join()
+    with (
+        Service(parse(text, "cell"), lambda file: "", [EndpointSpec("pty")], pace=pace) as service,
+        service.in_thread(),
+    ):
+        yield service.endpoints[0].address
 
 
 def test_calls_on_a_served_unit_and_a_stop_from_another_thread() -> None:

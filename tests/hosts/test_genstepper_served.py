@@ -1,7 +1,6 @@
 """The driver of a GenStepper board on a served one: over a real pseudo-terminal, as calls and as coroutines."""
 
 import asyncio
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -23,14 +22,11 @@ PATIENCE = 20.0  # this computer may be busy
 def served(line_timing: bool = True) -> Iterator[str]:
     """The address of a board, fifty times as fast as real time."""
     description = parse(BOARD, "board")
-    with Service(description, lambda file: "", [EndpointSpec("pty")], pace=50, line_timing=line_timing) as service:
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
-            yield service.endpoints[0].address
-        finally:
-            service.stop()
-            serving.join()
+    with (
+        Service(description, lambda file: "", [EndpointSpec("pty")], pace=50, line_timing=line_timing) as service,
+        service.in_thread(),
+    ):
+        yield service.endpoints[0].address
 
 
 @pytest.mark.parametrize("line_timing", [True, False])

@@ -1,7 +1,6 @@
 """The driver of the GS-C200 on served modules: over a real pseudo-terminal, as calls and as coroutines."""
 
 import asyncio
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -29,14 +28,8 @@ PATIENCE = 20.0  # this computer may be busy
 @contextmanager
 def served() -> Iterator[str]:
     """The address of the line of two modules, fifty times as fast as real time."""
-    with Service(parse(TWO, "two"), lambda file: "", [EndpointSpec("pty")], pace=50) as service:
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
-            yield service.endpoints[0].address
-        finally:
-            service.stop()
-            serving.join()
+    with Service(parse(TWO, "two"), lambda file: "", [EndpointSpec("pty")], pace=50) as service, service.in_thread():
+        yield service.endpoints[0].address
 
 
 def modules() -> tuple[GsC200, GsC200]:

@@ -1,7 +1,6 @@
 """The SUPERSIGMA's drivers on drives that are served: messages and answers as a stream of bytes."""
 
 import asyncio
-import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
@@ -28,14 +27,8 @@ units = ["left", "right"]
 @contextmanager
 def served(kind: str) -> Iterator[tuple[Service, str]]:
     wanted = [EndpointSpec("tcp", "127.0.0.1:0")] if kind == "tcp" else [EndpointSpec("pty")]
-    with Service(parse(TWO, "two"), lambda file: "", wanted, pace=50) as service:
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
-            yield service, service.endpoints[0].address
-        finally:
-            service.stop()
-            serving.join()
+    with Service(parse(TWO, "two"), lambda file: "", wanted, pace=50) as service, service.in_thread():
+        yield service, service.endpoints[0].address
 
 
 def positions(service: Service) -> list[int]:

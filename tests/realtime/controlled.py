@@ -1,6 +1,5 @@
 """Services that are run in a thread for a test, with what controls them."""
 
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -59,10 +58,5 @@ def controlled(description: Description, *, free: bool = True) -> Iterator[Contr
     with Service(description, again, observed=True) as service:
         if free:
             service.pace.change(None, service.cell.now)
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
+        with service.in_thread():
             yield Control(service)
-        finally:
-            service.stop()
-            serving.join()

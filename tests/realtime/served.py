@@ -1,6 +1,5 @@
 """Units that are served in this process, for tests of what connects to them."""
 
-import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
@@ -29,13 +28,8 @@ def served(
         what = single(what, straps=dict(straps or {}), options=dict(options or {}))
     with Service(what, no_file, endpoints, line_timing=line_timing, pace=pace) as service:
         service.cell.run_to(SECOND)
-        thread = threading.Thread(target=service.run, daemon=True)
-        thread.start()
-        try:
+        with service.in_thread():
             yield service
-        finally:
-            service.stop()
-            thread.join(60)
 
 
 def address(service: Service) -> str:

@@ -1,7 +1,6 @@
 """Units that the workbench talks to: looks, lines, hands, STOP; units that stall, babble, lie, or are unplugged."""
 
 import asyncio
-import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
@@ -149,14 +148,11 @@ def at_desk(folder: Path, scene: Callable[[Desk], Awaitable[None]]) -> None:
 @contextmanager
 def served(model: str, pace: int = 20) -> Iterator[str]:
     text = f'[units.unit]\nmodel = "{model}"\n'
-    with Service(parse(text, "cell"), lambda file: "", [EndpointSpec("pty")], pace=pace) as service:
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
-            yield service.endpoints[0].address
-        finally:
-            service.stop()
-            serving.join()
+    with (
+        Service(parse(text, "cell"), lambda file: "", [EndpointSpec("pty")], pace=pace) as service,
+        service.in_thread(),
+    ):
+        yield service.endpoints[0].address
 
 
 @asynccontextmanager

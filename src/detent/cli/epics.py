@@ -5,7 +5,6 @@ import json as json_text
 import os
 import re
 import sys
-import threading
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -191,13 +190,8 @@ def _emulated(
             (axis.title, axis.model, {**axis.options, **axis.form._asdict()}, where[axis.line])
             for axis in axes(found.description, service.cell)
         ]
-        thread = threading.Thread(target=service.run, name="detent")
-        thread.start()
-        try:
+        with service.in_thread():
             yield parts
-        finally:
-            service.stop()
-            thread.join()
 
 
 def _named(

@@ -284,10 +284,5 @@ def _emulated(model: str, options: UnitOptions) -> Iterator[str]:
 
     with Service(single(model), no_file) as service:
         service.cell.run_to(SECOND)  # it has been on for a while: a board that is reset says nothing at first
-        thread = threading.Thread(target=service.run, name="unit", daemon=True)
-        thread.start()
-        try:
+        with service.in_thread():
             yield service.endpoints[0].address
-        finally:
-            service.stop()
-            thread.join()

@@ -1,8 +1,9 @@
 """A cell with everything it needs to be served: its endpoints opened, its images in possession, its loop."""
 
 import contextlib
+import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from fractions import Fraction
@@ -161,6 +162,17 @@ class Service:
         wake_exactly()
         self.restart_clock()  # the time since the cell was made was ours, not the cell's
         self._loop.run()
+
+    @contextlib.contextmanager
+    def in_thread(self) -> Iterator[None]:
+        """Serve in a thread of its own, until the end of the block."""
+        thread = threading.Thread(target=self.run, name="detent", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            self.stop()
+            thread.join()
 
     def stopped_by_signals(self) -> AbstractContextManager[None]:
         """SIGTERM, SIGINT and SIGHUP call `stop` while this lasts. For the main thread."""

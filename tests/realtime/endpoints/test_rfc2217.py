@@ -2,7 +2,6 @@
 
 import asyncio
 import socket
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -32,14 +31,8 @@ pyserials = pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarni
 def served() -> Iterator[str]:
     """A GS-C200 behind RFC 2217: the URL."""
     endpoints = [EndpointSpec("rfc2217", "127.0.0.1:0")]
-    with Service(single("gs-c200"), lambda file: "", endpoints, pace=20) as service:
-        serving = threading.Thread(target=service.run)
-        serving.start()
-        try:
-            yield f"rfc2217://{service.endpoints[0].address}"
-        finally:
-            service.stop()
-            serving.join()
+    with Service(single("gs-c200"), lambda file: "", endpoints, pace=20) as service, service.in_thread():
+        yield f"rfc2217://{service.endpoints[0].address}"
 
 
 def frame(text: str) -> bytes:
