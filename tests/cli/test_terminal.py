@@ -102,7 +102,7 @@ def test_a_history_that_cannot_be_kept_is_no_trouble(
     [
         ("gs-c200s", "V1\n", "> V1\n< V+0  (position 0)\n"),
         ("bs0610", "-1?\n", "> -1?\n< X,-1,0  (X: position 0)\n< Y,-1,0  (Y: position 0)\n< *\n"),
-        ("dcb-274", "Z\n", "> Z\n<         0\n"),
+        ("dcb-274", "Z\n", "> Z\n<         0  (position 0)\n"),
         ("supersigma", "status\n\n", "> status\n< 0 steps  (at rest)\n"),
     ],
 )
