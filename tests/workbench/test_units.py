@@ -208,7 +208,9 @@ def test_program_and_backup(tmp_path: Path) -> None:
         assert told.startswith("2 instructions")
         assert await desk.units.unit_compare(name, "+ 500\nW 0\n") == []
         assert await desk.units.unit_compare(name, "+ 501\nW 0\n")
-        assert "+ 500" in await desk.units.unit_source(name)
+        source = await desk.units.unit_source(name)
+        assert source.startswith("+ 500\nW 0\n")
+        assert "\n; left of an older program at 8-" in source, "the factory's is longer"
         with pytest.raises(ValueError, match="no command"):
             await desk.units.unit_store(name, "nonsense\n")
         assert await desk.units.unit_backup(name, "kept.toml") == "kept.toml"

@@ -207,7 +207,9 @@ class Units:
         unit = self._unit(name)
         language = catalogue.language(unit.model)
         lines: list[str] = await unit.perform("reading the program", cast(Any, unit.shell.driver).read_program())
-        return source_of(language, lines)
+        left = getattr(unit.shell.driver, "left_over", "")
+        told = f"{language.comment} left of an older program at {left}, behind an end mark\n" if left else ""
+        return source_of(language, lines) + told
 
     async def unit_compare(self, name: Name, source: Text) -> list[str]:
         """How the program of a unit and `source` differ, as the lines of a diff; none: they are the same."""
