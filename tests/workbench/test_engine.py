@@ -351,3 +351,23 @@ def test_the_past_is_kept_as_far_as_the_memory_allows_and_it_is_told_from_when_o
     assert keep(512) > 2 * keep(300) > 2 * keep(0) == 2 * LEAST_KEPT
     # measured: 292 MB for both in one process with 400 000 to 500 000 batches of the drilling cell, 55 MB before them
     assert keep(512) * 1.25 * BATCH / 1e6 <= 512 - BASE
+
+
+def test_what_a_unit_does_otherwise_than_one_may_think_is_marked_on_the_time_line() -> None:
+    """A goto behind a homing that was cut off below 0 goes the long way (datasheet, "Gxxxxxxx"): it is no error."""
+
+    async def scene(bench: Bench) -> None:
+        await bench.type("gs-c200", "H-")
+        homing = await bench.until(lambda state: state.units["gs-c200"].axes[""].shaft < -20)
+        assert not homing.marks
+        await bench.type("gs-c200", "K")
+        await bench.until(lambda state: state.units["gs-c200"].state == "ready")
+        await bench.type("gs-c200", "G0")
+        state = await bench.until(lambda state: bool(state.marks))
+        mark = state.marks[0]
+        assert (mark.kind, mark.unit) == ("caution", "gs-c200")
+        assert mark.text.startswith("G0: a homing that was cut off has taken the counter below 0")
+        assert state.units["gs-c200"].error is None
+        await bench.type("gs-c200", "K")
+
+    play(scene, "gs-c200")

@@ -44,6 +44,50 @@ def test_what_is_wrong_with_a_new_cell_is_said(change: dict[str, Any], words: st
         NewCell.model_validate(DRILLING | change).text()
 
 
+FITTED = {
+    "units": [{"name": "bar", "model": "gs-c200", "straps": {"CHS": "low", "RXD": "high"}, "program": "bar.gsc"}],
+    "motors": [{"unit": "bar", "motor": "17hs4401", "supply": 24, "lead": 0.04}],
+}
+
+
+def test_a_unit_has_straps_a_program_and_a_motor() -> None:
+    text = NewCell.model_validate(FITTED).text(lambda file: "+10\n")
+    assert text == (
+        '[units.bar]\nmodel = "gs-c200"\nstraps = { CHS = "low", RXD = "high" }\nprogram = "bar.gsc"\n\n'
+        '[motors.bar_motor]\nunit = "bar"\nmotor = "17hs4401"\nsupply = 24\nlead = 0.04\n'
+    )
+
+
+@pytest.mark.parametrize(
+    ("unit", "words"),
+    [
+        ({"straps": {"CHX": "low"}}, "CHX"),
+        ({"program": "none.gsc"}, "cannot be read|none.gsc"),
+        ({"program": "bad.gsc"}, "bad.gsc"),
+    ],
+)
+def test_what_is_wrong_with_what_a_unit_has_is_said(tmp_path: Path, unit: dict[str, Any], words: str) -> None:
+    (tmp_path / "bad.gsc").write_text("no program\n")
+    with pytest.raises(ValueError, match=words):
+        NewCell.model_validate({"units": [{"name": "bar", "model": "gs-c200", **unit}]}).text(
+            lambda file: (tmp_path / file).read_text()
+        )
+
+
+def test_every_strap_of_every_model_is_tied_or_said_to_be_wrong() -> None:
+    tied = 0
+    for model, found in jacks().items():
+        for level in ("low", "high"):
+            for pin in found["straps"]:
+                cell = {"units": [{"name": "unit", "model": model, "straps": {pin: level}}]}
+                try:
+                    assert f'straps = {{ {pin} = "{level}" }}' in NewCell.model_validate(cell).text()
+                    tied += 1
+                except ValueError as error:  # a jumper that goes with another one
+                    assert pin in str(error)
+    assert tied > 40
+
+
 @pytest.mark.parametrize("name", ["Zwei Achsen", 'a"b', "a.b", "ä", "\n"])
 def test_any_title_comes_back(name: str) -> None:
     text = NewCell.model_validate(DRILLING | {"title": name}).text()

@@ -1,12 +1,15 @@
 """What the page Begin asks of the server: what can be opened, opening it, making a new cell, looking commands up."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from detent.cell.description import parse
+from detent.cell.build import build
+from detent.cell.description import parse, single
 from detent.controllers import catalogue
+from detent.motors.named import MOTORS
 from detent.realtime.examples import home
 from detent.realtime.images import cell_name
 from detent.realtime.texts import read_text
@@ -23,12 +26,20 @@ EXAMPLE = "example:"  # before the name of one, where a target is asked for
 
 
 class Beginning:
-    """Offers ``places open_place jacks new_cell save_cell command_reference``."""
+    """Offers ``places open_place jacks fittings new_cell save_cell command_reference``."""
 
     def __init__(self, bench: "Bench", live: Live, folder: Folder, drafts: Drafts) -> None:
         """Cells are opened and saved in `folder`; `drafts` become those of the cell that is opened."""
         self._bench, self._folder, self._drafts = bench, folder, drafts
-        for call in (self.places, self.open_place, self.jacks, self.new_cell, self.save_cell, self.command_reference):
+        for call in (
+            self.places,
+            self.open_place,
+            self.jacks,
+            self.fittings,
+            self.new_cell,
+            self.save_cell,
+            self.command_reference,
+        ):
             live.offer(call.__name__, call)
 
     async def places(self) -> dict[str, object]:
@@ -65,14 +76,26 @@ class Beginning:
         """For each model, parts too, what wires lead from and to."""
         return jacks()
 
-    async def new_cell(self, cell: NewCell) -> str:
-        """The cell file of what was chosen. Raises ValueError with what is wrong."""
-        return cell.text()
+    async def fittings(self) -> dict[str, object]:
+        """What units of a new cell can have: motors, by name; axes of each model that moves something, and programs."""
+        return {
+            "motors": list(MOTORS),
+            "axes": {name: _axes(name) for name in catalogue.MODELS},
+            "programs": [name for name, model in catalogue.MODELS.items() if model.language is not None],
+        }
+
+    async def new_cell(self, cell: NewCell, name: Name = "") -> str:
+        """The cell file of what was chosen, for a file of that name. Raises ValueError with what is wrong."""
+        return cell.text(self._beside(name))
+
+    def _beside(self, name: str) -> Callable[[str], str]:
+        """Reads files that a cell file of that name would name."""
+        return lambda file: self._folder.read_text(str(Path(name).parent / file))
 
     async def save_cell(self, name: Name, cell: NewCell, over: bool = False) -> str:
         """Write a new cell into the folder, never over a file unless `over` says so. Returns its name."""
         name = name if name.endswith(".toml") else f"{name}.toml"
-        text = cell.text()
+        text = cell.text(self._beside(name))
         if self._folder.path(name).exists() and not over:
             raise FileExistsError(f"{name} is there already: give it another name, or say that it may be replaced")
         self._folder.write(name, text.encode())
@@ -84,6 +107,12 @@ class Beginning:
             {"command": row.command, "argument": row.argument, "what": row.what, "section": row.section}
             for row in catalogue.model(model).commands()
         ]
+
+
+def _axes(model: str) -> list[str]:
+    """The names of the axes of a unit alone; "" for a single one."""
+    cell = build(single(model), lambda file: "")
+    return [axis for unit in cell.controllers().values() for axis in unit.axes]
 
 
 def _cells(root: Path, names: list[str] | None = None) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from tests.workbench.browser.test_access import findings, needs_axe
 from tests.workbench.browser.windows import PHONE, WIDE, Served, Window, Windows
 
 CELL = """
@@ -84,3 +85,17 @@ def test_it_fits_a_phone(windows: Windows, driven: Served) -> None:
 def test_without_real_pins_there_is_no_stop(window: Window) -> None:
     assert window.get("real") is None
     assert not window.page.get_by_role("button", name=STOP, exact=True).is_visible()
+
+
+@needs_axe
+@pytest.mark.parametrize("size", [WIDE, PHONE])
+def test_a_cell_on_real_pins_has_no_serious_finding_driven_or_stopped(
+    windows: Windows, driven: Served, size: tuple[int, int]
+) -> None:
+    window = opened(windows, driven, size)
+    window.page.locator(".unit").first.wait_for()
+    assert findings(window) == []
+    window.call("stop_motors")
+    window.page.get_by_text("x: emergency stop").wait_for()
+    assert findings(window) == []
+    window.call("recover")

@@ -5,7 +5,9 @@ const { part, call, toast, remembered, remember } = window.detent;
 part("begin", (box) => {
   const role = (name) => box.querySelector(`[data-role="${name}"]`);
   let jacks = {};
-  let cell = { title: "", units: [], wires: [], switches: [] };
+  let fittings = { motors: [], axes: {}, programs: [] };
+  let cell = { title: "", units: [], wires: [], switches: [], motors: [] };
+  const open = new Set(); // units whose fittings are shown
   let from = null; // the output that was clicked
   let armed = "";
   try {
@@ -31,7 +33,7 @@ part("begin", (box) => {
 
   // -- opening --
 
-  async function open(place) {
+  async function openPlace(place) {
     toast("Opening\u2026");
     try {
       await call("open_place", place);
@@ -48,7 +50,7 @@ part("begin", (box) => {
       const made = element("div", "group");
       made.append(element("h3", "", title));
       for (const [place, words] of list) {
-        const one = button("key place", "", () => open(place));
+        const one = button("key place", "", () => openPlace(place));
         one.append(element("b", "", place.replace(/^example:/, "")), element("span", "quiet", words === place ? "" : words));
         if (place === told.open) one.append(element("span", "open", "open"));
         made.append(one);
@@ -105,6 +107,7 @@ part("begin", (box) => {
       cell.units = cell.units.filter((one) => one !== unit);
       cell.wires = cell.wires.filter((wire) => !of(wire.source) && !of(wire.target));
       cell.switches = cell.switches.filter((one) => !of(one.drives));
+      cell.motors = cell.motors.filter((one) => one.unit !== unit.name);
       draw();
     }, `Take ${unit.name} away`));
     const pins = element("div", "jacks");
@@ -113,8 +116,66 @@ part("begin", (box) => {
       for (const pin of (jacks[unit.model] || {})[side] || []) column.append(jack(`${unit.name}.${pin}`, pin, side));
       pins.append(column);
     }
-    made.append(head, pins);
+    made.append(head, pins, fitted(unit));
     return made;
+  }
+
+  function field(label, made, changed) {
+    const box = element("label", "quiet", `${label} `);
+    made.className += " field";
+    made.setAttribute("aria-label", label);
+    made.addEventListener("change", () => {
+      changed(made.value.trim());
+      draw();
+    });
+    box.append(made);
+    return box;
+  }
+
+  function choice(values, chosen) {
+    const made = element("select", "");
+    made.append(...values.map((value) => new Option(value || "\u2013", value)));
+    made.value = chosen;
+    return made;
+  }
+
+  function input(value, type = "text") {
+    const made = element("input", "mono");
+    made.type = type;
+    if (type === "number") made.step = "any";
+    made.value = value ?? "";
+    return made;
+  }
+
+  /** What a unit has besides its wires: straps, a program, a motor on each axis. */
+  function fitted(unit) {
+    const box = element("details", "fitted");
+    box.open = open.has(unit.name);
+    box.addEventListener("toggle", () => (box.open ? open.add(unit.name) : open.delete(unit.name)));
+    box.append(element("summary", "", "Straps, program, motor"));
+    const straps = element("div", "row wrap");
+    unit.straps ||= {};
+    for (const pin of (jacks[unit.model] || {}).straps || [])
+      straps.append(field(pin, choice(["", "low", "high"], unit.straps[pin] || ""), (value) => {
+        if (value) unit.straps[pin] = value;
+        else delete unit.straps[pin];
+      }));
+    box.append(straps);
+    if (fittings.programs.includes(unit.model)) box.append(field("Program (a file beside the cell)", input(unit.program), (value) => (unit.program = value)));
+    for (const axis of fittings.axes[unit.model] || []) {
+      const motor = cell.motors.find((one) => one.unit === unit.name && one.axis === axis);
+      const row = element("div", "row wrap");
+      row.append(field(`Motor ${axis}`.trim(), choice(["", ...fittings.motors], motor ? motor.motor : ""), (value) => {
+        cell.motors = cell.motors.filter((one) => one !== motor);
+        if (value) cell.motors.push({ supply: 24, lead: null, ...motor, unit: unit.name, axis, motor: value });
+      }));
+      if (motor) {
+        row.append(field("Supply, V", input(motor.supply, "number"), (value) => (motor.supply = Number(value) || 24)));
+        row.append(field("Lead, mm or \u00b0 a step", input(motor.lead, "number"), (value) => (motor.lead = Number(value) || null)));
+      }
+      box.append(row);
+    }
+    return box;
   }
 
   function jack(end, pin, side) {
@@ -183,7 +244,7 @@ part("begin", (box) => {
     let words = "";
     let bad = false;
     try {
-      words = await call("new_cell", ready());
+      words = await call("new_cell", ready(), role("file").value.trim());
     } catch (error) {
       words = error.message;
       bad = true;
@@ -240,7 +301,7 @@ part("begin", (box) => {
   role("save").addEventListener("click", save);
   role("save-open").addEventListener("click", async () => {
     const name = await save();
-    if (name) open(name);
+    if (name) openPlace(name);
   });
   role("file").addEventListener("input", () => (armed = ""));
 
@@ -264,8 +325,9 @@ part("begin", (box) => {
   role("model").addEventListener("change", commands);
   role("search").addEventListener("input", search);
 
-  call("jacks").then((told) => {
+  Promise.all([call("jacks"), call("fittings")]).then(([told, more]) => {
     jacks = told;
+    fittings = more;
     role("unit-model").replaceChildren(...Object.keys(jacks).map((name) => new Option(name, name)));
     draw();
   }).catch((error) => toast(error.message, "error"));

@@ -232,8 +232,8 @@ def _manual(picture: Picture, unit: UnitPicture, axis: str, motor: MotorPicture 
         keys("home", "&#8676; home", "home &#8677;", "Home"),
     )
     return f"""<details class="manual" data-part="manual" data-facts="{escape(json.dumps(facts))}">
-<summary>Manual control</summary><div class="row wrap">{jog[0]}<input class="field num" data-role="by" type="number" step="any"
- value="100" aria-label="Distance or position of {title}">{measure}{jog[1]}
+<summary>Manual control</summary><div class="row wrap">{jog[0]}<input class="field num" data-role="by" type="number"
+ step="any" value="100" aria-label="Distance or position of {title}">{measure}{jog[1]}
 <button type="button" class="key small" data-role="go" aria-label="Go to, {title}">Go to</button>
 <button type="button" class="key small" data-role="zero" aria-label="Set zero, {title}"
  data-help="Where the axis stands is 0 from then on">Set zero</button>
