@@ -114,7 +114,7 @@ class NewCell(_Chosen):
 
 def jacks() -> dict[str, dict[str, list[str]]]:
     """For each model, parts too, what a wire can lead from (``out``) and to (``in``), and its ``straps``."""
-    models = {**catalogue.MODELS, **PARTS}
+    models: dict[str, catalogue.Configurable] = {**catalogue.MODELS, **PARTS}
     fits: dict[str, Callable[[PinKind], bool]] = {
         "in": lambda kind: kind.reads and kind not in (PinKind.STRAP, PinKind.SERIAL),
         "out": lambda kind: kind in (PinKind.OUTPUT, PinKind.OPEN_COLLECTOR),
