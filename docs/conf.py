@@ -14,7 +14,7 @@ nitpicky = False
 suppress_warnings = ["myst.strikethrough"]
 
 myst_heading_anchors = 4
-myst_enable_extensions = ["deflist", "fieldlist"]
+myst_enable_extensions = ["deflist", "fieldlist", "html_image"]
 myst_fence_as_directive = []
 
 default_role = "code"

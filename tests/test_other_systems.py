@@ -4,6 +4,7 @@ It stands in for a system that nobody here has: the modules cannot be imported, 
 taken away before anything is loaded. What it cannot show is told in `docs/explanation/other-systems.md`.
 """
 
+import ast
 import contextlib
 import json
 import os
@@ -86,6 +87,19 @@ def serving(elsewhere: Mapping[str, str], *words: str | Path) -> Iterator[Any]:
 def test_the_process_really_lacks_them(name: str, elsewhere: Mapping[str, str]) -> None:
     found = subprocess.run([sys.executable, "-c", f"import {name}"], env=elsewhere, capture_output=True, check=False)
     assert found.returncode == 1
+
+
+def test_they_are_asked_for_in_one_place() -> None:
+    """But for the pseudo-terminal, which is loaded where one is made."""
+    found = {
+        str(path.relative_to("src/detent"))
+        for path in Path("src/detent").rglob("*.py")
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for name in ([one.name for one in node.names] if isinstance(node, ast.Import) else [node.module])
+        if name in MISSING
+    }
+    assert found == {"realtime/endpoints/pty.py"}  # system.py tries them
 
 
 def test_every_module_that_the_rest_needs_can_be_imported(elsewhere: Mapping[str, str]) -> None:

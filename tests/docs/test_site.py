@@ -4,7 +4,9 @@ import re
 import shutil
 import subprocess
 import sys
+from html.parser import HTMLParser
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -34,6 +36,38 @@ def test_nothing_is_loaded_from_elsewhere(site: Path) -> None:
         assert not loads.search(page.read_text()), page
     for style in site.rglob("*.css"):
         assert not re.search(r"(?:@import\s*|url\(\s*)[\"']?(?:https?:)?//", style.read_text()), style
+
+
+class Links(HTMLParser):
+    """Where a page leads, and what in it can be led to."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.targets: list[str] = []
+        self.anchors = {""}
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        self.anchors |= {value for name in ("id", "name") if (value := found.get(name))}
+        self.targets += [value for name in ("href", "src") if (value := found.get(name))]
+
+
+def test_every_link_leads_to_a_place_that_is_there(site: Path) -> None:
+    pages = {page: Links(page.read_text()) for page in site.rglob("*.html")}
+    wrong = []
+    for page, links in pages.items():
+        if "_modules" in page.parts:
+            continue  # the sources, whose way back is Sphinx's own
+        for target in links.targets:
+            place, _, anchor = unquote(target).partition("#")
+            if "://" in target or place.startswith(("data:", "mailto:")):
+                continue
+            other = (page.parent / place.partition("?")[0]).resolve() if place else page
+            known = pages.get(other)
+            if not other.exists() or (known is not None and anchor not in known.anchors):
+                wrong.append(f"{page.relative_to(site)}: {target}")
+    assert wrong == []
 
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="chromium is not installed")
