@@ -12,7 +12,8 @@ from detent.cell.actions import Action, Load, PlaceSwitch, Power, Release, Send,
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import parse
-from detent.cell.history import Broken, Cut, History
+from detent.cell.history import Broken, History
+from detent.cell.moments import Cut
 from detent.cell.recording import Batch
 from detent.cell.stores import Stores
 from detent.pins import PinSet

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from detent.cell.description import Problem
-from detent.cell.history import Cut
+from detent.cell.moments import Cut
 from detent.outputs.signals import Signals
 from detent.pins import Level
 from detent.realtime.cell_source import find_cell

@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 from detent.cell.build import Read
 from detent.cell.cell import Cell
 from detent.cell.description import Description
-from detent.cell.history import History, Moment
+from detent.cell.history import History
 from detent.cell.mechanics import Mechanics
+from detent.cell.moments import Moment
 from detent.cell.panel import Front
 from detent.cell.parts import PARTS
 from detent.cell.switches import AxisSwitch, Switch

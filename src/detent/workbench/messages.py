@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 from detent.cell.actions import TimedAction
-from detent.cell.history import Cut
+from detent.cell.moments import Cut
 from detent.cell.recording import Batch
 from detent.motors.rotor import Floats
 from detent.outputs.units import UnitView

@@ -11,7 +11,7 @@ from typing import Final
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.actions import Load, TimedAction
-from detent.cell.history import Cut
+from detent.cell.moments import Cut
 from detent.cell.recording import Batch, Entry, InputSet, Received, Recording, Span
 from detent.controllers.device import DriveSet, Powered, Refused, StageSet
 from detent.outputs.signals import Signals
