@@ -13,7 +13,7 @@ WIRE = "[[wires]]\n"
 A = ONE + '[switches.a]\ndrives = "bar.UI1"\n'
 FAULTS = [
     # form
-    ("units = ", "", "this is no TOML: "),
+    ("units = ", "", "it is no TOML: "),
     ("", "units", "this key is missing"),
     ("[units]\n", "", "a cell needs at least one unit: [units.NAME] with model = 'gs-c200'"),
     ("[units.bar]\n", "units.bar.model", "this key is missing"),

@@ -5,11 +5,11 @@ business; this module is given text. What checks a file (pydantic) is loaded whe
 none of it.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+from detent import toml
 from detent.one_line import one_line
 
 if TYPE_CHECKING:
@@ -96,13 +96,9 @@ class Description:
 def parse(text: str, file: str) -> Description:
     """The description in the TOML `text`. Raises Problem."""
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise Problem(file, "", f"this is no TOML: {error}") from None
-    except RecursionError:
-        raise Problem(file, "", "its tables and lists are nested too deeply: no key of a cell is") from None
-    except ValueError:  # an integer of more digits than Python reads
-        raise Problem(file, "", "it has a number of thousands of digits: no number of a cell is so long") from None
+        data = toml.loads(text)
+    except toml.NoToml as error:
+        raise Problem(file, "", str(error)) from None
     if "file" in data:
         raise Problem(file, "file", "there is no such key; remove it")
     return _checked(Description, {**data, "file": file}, file)

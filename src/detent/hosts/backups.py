@@ -1,10 +1,11 @@
 """A backup as text: everything that a unit keeps, in TOML that people read and `restore` takes back."""
 
 import re
-import tomllib
 from collections.abc import Callable, Mapping
 from difflib import unified_diff
 from typing import Any, Final, NamedTuple
+
+from detent import toml
 
 FORMAT: Final = "detent backup 1"
 KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
@@ -45,11 +46,9 @@ class Backup(NamedTuple):
     def parse(cls, text: str) -> "Backup":
         """Read a file. Raises BackupError."""
         try:
-            found = tomllib.loads(text)
-        except RecursionError:
-            raise BackupError("it is no backup: its tables and lists are nested too deeply") from None
-        except (tomllib.TOMLDecodeError, ValueError) as error:
-            raise BackupError(f"it is no TOML: {error}") from None
+            found = toml.loads(text)
+        except toml.NoToml as error:
+            raise BackupError(str(error)) from None
         if found.get("format") != FORMAT:
             raise BackupError(f"it is no backup: those begin with format = {_value(FORMAT)}; detent backup writes them")
         model, saved = found.get("model"), found.get("saved")

@@ -20,11 +20,11 @@ current = 2.8                   # A
 step = "half"
 """
 
-import tomllib
 from collections.abc import Sequence
 from math import inf, isfinite, pi
 from typing import Any, NamedTuple
 
+from detent import toml
 from detent.motors.drive import Drive
 from detent.motors.fit import Fit, Point, fit_from_curve
 from detent.motors.motor import Motor, MotorError
@@ -57,11 +57,9 @@ class Curve(NamedTuple):
 def read(text: str, file: str) -> tuple[Motor, Curve | None]:
     """The motor in the TOML `text`, and its curve if it names one. MotorError says which key, and what to do."""
     try:
-        data = tomllib.loads(text)
-    except RecursionError:
-        raise MotorError(f"{file}: its tables and lists are nested too deeply: no key of a motor is") from None
-    except (tomllib.TOMLDecodeError, ValueError) as error:
-        raise MotorError(f"{file}: this is no TOML: {error}") from None
+        data = toml.loads(text)
+    except toml.NoToml as error:
+        raise MotorError(f"{file}: {error}") from None
     curve = data.pop("curve", None)
     _check_keys(file, "", data, (*NUMBERS, *WORDS, "curve"))
     missing = [key for key in NEEDED if key not in data]
