@@ -6,13 +6,14 @@ from typing import Any
 import pytest
 from tests.realtime.controlled import controlled, no_file, one, slide
 
+from detent.cell.actions import Send, TimedAction
 from detent.cell.cell import Cell
 from detent.cell.description import parse, single
 from detent.realtime import verbs
 from detent.realtime.control import Control, Ending
 from detent.realtime.service import Service
 from detent.realtime.verbs import AskedWrongly, Verb
-from detent.realtime.watch import MOST_EVENTS, RecentLog
+from detent.realtime.watch import MOST_EVENTS, WEIGHT, RecentLog
 from detent.ticks import MS
 
 
@@ -216,6 +217,15 @@ def test_a_long_journal_forgets_its_beginning_and_counts_it() -> None:
     assert list(log)[-10:] == list(range(90, 100))
     assert log.forgotten + len(log) == 100
     assert len(log) <= 20
+
+
+def test_a_journal_of_long_actions_takes_no_more_room() -> None:
+    log: RecentLog[TimedAction] = RecentLog(1000)
+    for n in range(500):
+        log.append(TimedAction(n, Send(0, bytes(30_000))))
+    assert sum(len(action.what.data) for action in log) <= 2 * 1000 * WEIGHT  # type: ignore[union-attr]
+    assert log.forgotten + len(log) == 500
+    assert list(log)[-1].at == 499
 
 
 def test_events_take_no_room_without_end(cell: Control) -> None:

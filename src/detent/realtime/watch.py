@@ -17,6 +17,7 @@ from detent.uart import Sent
 MOST_EVENTS: Final = 200  # kept
 MOST_SAID: Final = 64  # characters of each unit kept
 MOST_ACTIONS: Final = 20_000  # in a journal that forgets
+WEIGHT: Final = 100  # characters of an action that count as one more
 
 Event = Refused | Cautioned | Powered | StoreImage
 
@@ -77,23 +78,37 @@ class Watch(Recording):
 
 
 class RecentLog(Log[T]):
-    """A log that forgets its beginning when it grows beyond twice `most`; `forgotten` counts."""
+    """A log that forgets its beginning when it grows beyond twice `most`; `forgotten` counts.
 
-    __slots__ = ("forgotten", "most")
+    An action with many characters counts as several: `WEIGHT` of them as one more.
+    """
+
+    __slots__ = ("_weight", "forgotten", "most")
 
     def __init__(self, most: int = MOST_ACTIONS) -> None:
         super().__init__()
         self.most, self.forgotten = most, 0
+        self._weight = 0
 
     def append(self, item: T) -> None:
         """Add one item."""
         super().append(item)
-        if self._size > 2 * self.most:
-            self.forgotten += self._size - self.most
-            self._items = self._items[self._size - self.most : self._size]
-            self._size = self.most
+        self._weight += _weight(item)
+        if self._weight > 2 * self.most:
+            kept, weight = 0, 0
+            while kept < self._size and weight + _weight(self._items[self._size - 1 - kept]) <= self.most:
+                weight += _weight(self._items[self._size - 1 - kept])
+                kept += 1
+            self.forgotten += self._size - kept
+            self._items = self._items[self._size - kept : self._size]
+            self._size, self._weight = kept, weight
 
     def __deepcopy__(self, memo: object) -> "RecentLog[T]":
         twin = super().__deepcopy__(memo)
         twin.most, twin.forgotten = self.most, self.forgotten
+        twin._weight = self._weight  # noqa: SLF001 (its own class)
         return twin
+
+
+def _weight(item: object) -> int:
+    return 1 + len(getattr(getattr(item, "what", item), "data", ())) // WEIGHT
