@@ -1,8 +1,8 @@
 """One DCB-274 as a device: the contract of `controllers.device`, and who gets each character.
 
 Work is split: `link` makes lines of characters, `desk` has the typed command in hand, `running` the program, `work`
-what both can do, `motion` the axis, `ports` the pins. Here they meet, and whatever the idle state tests is tested
-(jog, go: page 27).
+what both can do, `motion` the axis, `ports` the pins, `contacts` what sets something going. Here they meet, and
+whatever the idle state tests is tested (jog, go: page 27).
 """
 
 from collections import deque
@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from detent.controllers.dcb274 import current, pins, program, settings
 from detent.controllers.dcb274.commands import MODEL
+from detent.controllers.dcb274.contacts import Contacts
 from detent.controllers.dcb274.desk import VERSION, Desk, Stage
 from detent.controllers.dcb274.link import (
     CTRL_C,
@@ -41,7 +42,6 @@ from detent.uart import Char, Format, SerialPort
 
 SIGN_ON = f"    110 AMS SMC-27X2 {VERSION}\r\n"  # behind the echoed space
 CONFLICT = "GO-SS conflict\r\n"
-_CONTACTS = ("GO", "JOG1", "JOG2")
 
 
 class Dcb274(OneAxis):
@@ -66,6 +66,7 @@ class Dcb274(OneAxis):
         self._settings = Settings(name)
         self.memory = Memory(settings.factory(name))
         self._ports = Ports(self._driver, self._settings, p4_input)
+        self._contacts = Contacts(self._ports)
         self._motion = Motion(self._axis, self._ports, self._settings, encoder=encoder)
         self._trip = Trip(self._motion, self._ports, self.memory, self._settings)
         self._work = Work(self._motion, self._ports, self.memory, self._settings, self._trip, times=execution_times)
@@ -88,7 +89,7 @@ class Dcb274(OneAxis):
         self._after_line_feed = False  # before sign-on: a name behind it makes a daisy chain
         self._conflict = False  # GO and SS were both true
         self._stopped = False  # the soft stop input was active when it was looked at last
-        self._spent: set[str] = set()  # GO and jog inputs that were active at a stop, and have not been open since
+        self._contacts.reset()
         self._shown = 0  # the position printed last, for Z 1
         self._readout_at: Ns = NEVER
 
@@ -270,7 +271,7 @@ class Dcb274(OneAxis):
         """Whether the soft stop and jog inputs, as they are, ask for a stop."""
         if self._ports.stopped and not self._stopped:
             return True
-        return self._motion.jogging and self._motion.jog_ends(self._wanted(), self._ports.active("JOG-S"))
+        return self._motion.jogging and self._motion.jog_ends(self._contacts.jog, self._ports.active("JOG-S"))
 
     def switches(self, axis: str = "") -> Sequence[str]:
         """Both limits and home."""
@@ -485,12 +486,8 @@ class Dcb274(OneAxis):
             self._motion.soft_stop(now)
 
     def spend_contacts(self) -> None:
-        """A stop leads to rest: a contact that sets something going does so again only when it has been open."""
-        self._spent = {pin for pin in _CONTACTS if self._ports.active(pin)}
-
-    def _asks(self, pin: str) -> bool:
-        """Whether an input that sets something going is active, and no stop has come since that."""
-        return self._ports.active(pin) and pin not in self._spent
+        """A stop leads to rest."""
+        self._contacts.spend()
 
     def send(self, text: str, now: Ns) -> None:
         """Send characters as they are."""
@@ -508,7 +505,7 @@ class Dcb274(OneAxis):
     def _heed(self, news: News, now: Ns) -> None:
         """A step has reached the trip position; or a limit stops the motion, and a jog held meanwhile is spent."""
         if news.limited:
-            self._spent |= {pin for pin in ("JOG1", "JOG2") if self._ports.active(pin)}
+            self._contacts.spend_jogs()
         if news.tripped and (vector := self._trip.reached(now)):
             self._running.trip(vector, now)
 
@@ -539,23 +536,18 @@ class Dcb274(OneAxis):
     def _test_inputs(self, now: Ns) -> None:
         """Jog and go, in the idle state: no command begun or in hand, no program (page 27)."""
         desk, motion, ports = self._desk, self._motion, self._ports
-        if self._spent:
-            self._spent = {pin for pin in self._spent if ports.active(pin)}
-        wanted = self._wanted()
+        self._contacts.look()
+        jog = self._contacts.jog
         if motion.jogging:  # its release is heeded whatever else is going on
-            motion.jog(wanted, ports.active("JOG-S"), now)
+            motion.jog(jog, ports.active("JOG-S"), now)
             return
         idle = desk.stage is Stage.FREE and not desk.programming and not self._running.active and self._entry.empty
         if not idle or ports.stopped:
             return
-        if not motion.completing(now) and self._asks("GO"):
+        if not motion.completing(now) and self._contacts.ask("GO"):
             self._running.go(0, False, now)
-        elif motion.at_rest and wanted:
-            motion.jog(wanted, ports.active("JOG-S"), now)
-
-    def _wanted(self) -> int:
-        """The direction that the jog inputs ask for; 0 is none."""
-        return 0 if self._ports.stopped else self._asks("JOG1") - self._asks("JOG2")
+        elif motion.at_rest and jog:
+            motion.jog(jog, ports.active("JOG-S"), now)
 
     def _read_out(self, now: Ns) -> None:
         """Z 1: print a changed position when the line is free (page 53)."""
