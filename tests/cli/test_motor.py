@@ -149,7 +149,7 @@ def test_pull_in_tells_the_start_stop_speed_and_the_holes_of_resonance(capsys: p
         (["as1010", "--move", "100", "--as", "gs-c200", "S=9999"], "S takes 1 to 1000"),
         (["as1010", "--move", "100", "--as", "gs-c20", "S=9"], "did you mean gs-c200"),
         (["as1010", "--move", "100", "--as", "gs-c200", "--start", "9"], "settings of its own"),
-        (["as1010", "--move", "99", "--as", "gs-c200", "S=2", "--step", "1/8"], "does no '1/8'"),
+        (["as1010", "--move", "99", "--as", "gs-c200", "S=2", "--step", "1/7"], "does no '1/7'"),
         (["as1010", "--move", "99", "--vary", "luck=1"], "no variation of 'luck'"),
         (["as1010", "--move", "99", "--vary", "inertia"], "write NAME=PART"),
         (["as1010", "--damping", "3"], "ratio is 3"),

@@ -84,7 +84,7 @@ def test_every_model_is_spoken_to_in_its_own_way(capsys: pytest.CaptureFixture[s
             capsys, "dcb-274", address(service), "--patience", "1", "+100", "W 0", "Z", "Q 0", "foo", status=1
         )
     shown = out.splitlines()
-    assert shown[:6] == ["> +100", "<  (done)", "> W 0", "<  (done)", "> Z", "<       100"]
+    assert shown[:6] == ["> +100", "<  (done)", "> W 0", "<  (done)", "> Z", "<       100  (position 100)"]
     assert "< 0 + 1001" in shown
     assert shown[-1].startswith("< #  (refuses 'foo'")
     with served("dcb-274", straps={"PARTY": "high"}) as service:
