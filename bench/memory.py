@@ -17,6 +17,7 @@ from detent.workbench.messages import Order
 CELL = Path(__file__).parents[1] / "examples" / "drilling" / "bar-after-bar.toml"
 HOUR: Ns = 3600 * SECOND
 HOURS = 24
+SHIFT = 8  # hours; then the cell is switched off and on, as the counter of the bar overflows in the tenth (E5)
 BOUND = Order("", (), (), (), None, True, None, False).memory  # MB, the default
 
 
@@ -36,6 +37,8 @@ async def _lived(hours: int) -> tuple[float, float, float, float]:
     bench = await Bench.open(str(CELL), pace=None)
     try:
         for hour in range(1, hours + 1):
+            if hour > 1 and hour % SHIFT == 1:
+                await _switched_on_again(bench)
             await bench.until(lambda state, until=hour * HOUR: state.now >= until)  # type: ignore[misc]
             assert bench.engine_pid is not None
             found.append(_resident(bench.engine_pid) + _resident("self"))
@@ -45,6 +48,16 @@ async def _lived(hours: int) -> tuple[float, float, float, float]:
         return found[0], max(found), found[-1], (bench.state.end - bench.state.begin) / HOUR
     finally:
         await bench.close()
+
+
+async def _switched_on_again(bench: Bench) -> None:
+    """Every unit off and on, its program loaded and started."""
+    for unit in bench.picture.units:
+        await bench.power(unit, False)
+        await bench.power(unit, True)
+        checked = bench.program(unit).check(bench.sources[unit])
+        await bench.load(unit, checked.image, checked.base)
+        await bench.start(unit)
 
 
 def _resident(process: int | str) -> float:

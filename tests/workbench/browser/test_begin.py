@@ -9,7 +9,7 @@ from tests.workbench.browser.windows import LOOKS, Served, Windows
 @pytest.fixture
 def bench(chromium: object, serve: Callable[..., Served]) -> Served:
     """A workbench of its own: it opens other cells."""
-    return serve("bs0610")
+    return serve("bs0710")
 
 
 def test_a_new_cell_is_drawn_saved_and_opened(windows: Windows, bench: Served) -> None:

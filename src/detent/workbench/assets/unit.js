@@ -280,7 +280,7 @@ part("unit", (box) => {
   function row(one) {
     const made = element("div", `said${one.sender ? "" : " host"}${one.wrong ? " wrong" : ""}${one.question ? " question" : ""}`);
     made.dataset.number = one.number;
-    made.append(element("span", "when", seconds(one.begin)), element("span", "who", one.sender ? "\u2190 unit" : "\u2192 host"));
+    made.append(element("span", "when", seconds(one.begin)), element("span", "who", one.sender ? "unit:" : "host:"));
     const what = element("span", "what");
     for (const [kind, shown, meaning, hex] of one.parts) {
       const chip = element("span", `chip ${kind}`, shown);
