@@ -51,12 +51,15 @@ async def _lived(hours: int) -> tuple[float, float, float, float]:
 
 
 async def _switched_on_again(bench: Bench) -> None:
-    """Every unit off and on, its program loaded and started."""
-    for unit in bench.picture.units:
-        await bench.power(unit, False)
-        await bench.power(unit, True)
+    """Every unit off and on, its program loaded and started: the drill first, which the bar calls for 0.1 s only."""
+    units = list(bench.picture.units)
+    for on in (False, True):
+        for unit in units:
+            await bench.power(unit, on)
+    for unit in units:
         checked = bench.program(unit).check(bench.sources[unit])
         await bench.load(unit, checked.image, checked.base)
+    for unit in reversed(units):
         await bench.start(unit)
 
 
