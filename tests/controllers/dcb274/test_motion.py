@@ -410,3 +410,14 @@ def test_page_46_a_limit_that_closes_while_m_is_executed_is_not_driven_through(f
     bench.run_to(bench.now + 2_000_000_000)
     assert bench.unit.status(bench.now).state == "ready"
     assert bench.position - at <= 10
+
+
+@pytest.mark.parametrize("behind", ["@", "@\r"])
+def test_page_28_a_stop_that_is_typed_while_g_is_executed_ends_the_program_that_it_begins(behind):
+    bench = Bench()
+    bench.do("P 0", "+ 4000", "G 0", "P", wait=50_000_000)
+    bench.say("G\r" + behind)
+    bench.run_to(bench.now + 10_000_000)
+    assert bench.unit.status(bench.now).state == "ready"
+    assert bench.unit.next_deadline() is None
+    assert bench.position == 0

@@ -524,6 +524,7 @@ class Dcb274(OneAxis):
             self._entry.name = self._settings.name
         while self._inbox and not self._desk.busy:
             self._take(self._inbox.popleft(), now)
+            self._running.poll(now)  # an @ that waited for G ends the program that G has begun
             self._desk.poll(now)
         self._test_inputs(now)
         self._read_out(now)
