@@ -25,7 +25,7 @@ class Axle:
         self.stops = 0
         self.limited = 0.0  # amperes that were asked of its driver and are more than it gives; told
         self.awaits: tuple[str, WallNs] | None = None  # an input has stopped another axis, and this one too; since when
-        self.held: tuple[str, int] | None = None  # which input stopped it last, and where
+        self.held: tuple[str, bool, int] | None = None  # which input stopped it last, by which level, and where
         self.singles = 0  # so many times in a row a single pulse after the last time
         self.rested: Ns | None = 0  # since when it is at rest; None while it moves
         self._shaft = shaft  # at rest
@@ -89,8 +89,11 @@ class Axle:
             self.stepper.tell(MotionCut(now, _given(told[-1], now), self.what.axis))
 
     def displace(self, by: int) -> None:
-        """The shaft, at rest, is elsewhere."""
+        """The shaft, at rest, is elsewhere: as if the last motion had ended there."""
         self._shaft += by
+        told = self.motions.before(self.motions.count)[-2:]
+        if len(told) == 2 and isinstance(told[0], MotionStarted):
+            self.motions.amend(2, told[0]._replace(shaft=told[0].shaft + by))
 
     def instant_of(self, shaft: int, near: Ns) -> Ns:
         """The instant nearest to `near` at which the cell had the shaft at `shaft`; `near` itself if there is none.

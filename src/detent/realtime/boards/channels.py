@@ -24,6 +24,10 @@ class Channel(Generic[T]):
         """One more."""
         self._items.append(item)
 
+    def amend(self, back: int, item: T) -> None:
+        """The item that was `back` items ago (1: the last) is this one."""
+        self._items[-back] = item
+
     def since(self, count: int) -> list[T]:
         """Those from number `count` on, as far as they are kept."""
         return self._items[max(count - self._first, 0) :]

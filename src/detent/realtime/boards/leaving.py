@@ -69,6 +69,7 @@ class Leaving:
         ]
         for owner, pin in plan.outs:
             cell.parts[cell.unit(owner)].watch(pin)  # of a winding, or of a pulse, every level is told
+        self._given_at: dict[str, tuple[Axle, Ns]] = {}  # which axis an input has stopped last, and when in the cell
         self._by_stepper = {axle.name: axle for axle in self.axles}
         self._of_unit: dict[int, list[Axle]] = {}
         for axle in self.axles:

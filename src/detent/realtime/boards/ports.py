@@ -71,7 +71,8 @@ class SerialPort:
             raise PortError(f"{device} is in use by another program; end that first") from error
         except (OSError, TerminalError, ValueError) as error:
             self.close()
-            raise PortError(f"{device} is no serial device: {error}; name the board's own, as in {BY_ID}") from error
+            why = str(error.args[-1]).lower()
+            raise PortError(f"{device} is no serial device ({why}): name the board's own, as in {BY_ID}") from error
 
     def _set_baud(self) -> None:
         import serialx

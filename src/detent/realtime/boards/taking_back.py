@@ -30,6 +30,12 @@ class TakingBack(Leaving):
         """The firmware has stopped an axis: the cell is taken back to there."""
         began = self._wall()
         axle = self._by_stepper[event.stepper]
+        other, given = self._given_at.get(event.input, (axle, event.at))
+        if other is not axle and event.at < given and axle.motion is None:
+            self._stopped_too(
+                axle, event
+            )  # it is later than the other, and the input has stopped it in the cell already
+            return
         axle.guard.fired()
         axle.stops += 1
         self.rewinds += 1
@@ -63,6 +69,7 @@ class TakingBack(Leaving):
             if place in fresh or self._given[name] != found:
                 actions.append(SetPin(*place, found))
                 self._raw[name] = self._given[name] = found
+        self._given_at[event.input] = axle, at
         level = int(event.level)
         actions.append(SetPin(unit, pin, level))
         drop = {(when, set_) for when, set_, _ in self._reports if when > at and (set_.unit, set_.pin) in late}
@@ -85,8 +92,8 @@ class TakingBack(Leaving):
     def _gates(self, axle: Axle, event: Stopped) -> bool:
         """Whether an input has stopped every single pulse of late."""
         last = axle.held
-        alone = last is not None and last[0] == event.input and abs(event.shaft - last[1]) <= 1
-        axle.held = event.input, event.shaft
+        alone = last is not None and last[:2] == (event.input, event.level) and abs(event.shaft - last[2]) <= 1
+        axle.held = event.input, event.level, event.shaft
         axle.singles = axle.singles + 1 if alone else 0
         return axle.singles >= MOST_SINGLES
 
@@ -116,7 +123,8 @@ class TakingBack(Leaving):
             counts.extend(ahead[: len(self.axles)])
             for axle, count in zip(self.axles, counts, strict=True):
                 before = axle.motions.before(count)
-                motions[axle.name] = axle.take_back(count, _rests(before, axle.shaft_at(at)))
+                here = axle.place_at(at)
+                motions[axle.name] = axle.take_back(count, _rests(before, axle.shaft_at(at) if here is None else here))
             place = len(self.axles)
             for out in self._outs.values():
                 count = moment.counts[place] + self._levels_in(batches, out)
@@ -216,7 +224,10 @@ class TakingBack(Leaving):
         axle.stops += 1
         if axle.motion is not None:
             self._fault(axle, f"{event.input} has stopped it, and it moves on in the cell")
-        self._place(axle, event.shaft)
+        if event.shaft != axle.shaft_at(self.cell.now):
+            self._place(axle, event.shaft)
+            self.past.clear()  # nobody goes back to before that
+            self.past.keep()
         axle.stepper.rewind(event.shaft)
         self._arm()
         self._pending = True
@@ -234,6 +245,13 @@ class TakingBack(Leaving):
 
     def _contradicted(self, axle: Axle, stopped: Axle, lost: int) -> None:
         """Pulses left that the cell did not give after all: it is told where the motor is, and the axis stands."""
+        if axle.what.unit == stopped.what.unit and axle.motion is None:  # it is ahead of the other, which slipped
+            what = f"{lost} steps that had left when a late stop of {stopped.name} was told are counted all the same"
+            self._say(Weight.WARNING, f"{axle.name}: {what}")
+            self._place(axle, axle.stepper.shaft)
+            self.past.clear()
+            self.past.keep()
+            return
         what = f"{lost} steps left the pins though a stop of {stopped.name} took them back"
         self._fault(axle, f"{what}: wires of the cell make it follow too closely; the counter says where it stands")
         self._place(axle, axle.stepper.shaft)
