@@ -28,6 +28,8 @@ def a_stop_leads_to_rest(model: Model, past: History, stop: Stop, met: Met) -> b
     bench.go_to(bench.now + 1000 * SECOND)
     later = {axis: bench.travels[axis].count(bench.now) for axis in axes}
     assert later == given, f"what was pending before {stop.name} at {begun} ns moved afterwards"
+    told = {axis: bench.device.status(bench.now, axis).state for axis in axes}
+    assert not set(told.values()) & {"running", "moving", "homing"}, f"{stop.name} at {begun} ns: it says {told}"
     met |= phases
     return True
 
