@@ -162,3 +162,9 @@ def test_an_unknown_model_or_option_is_refused_with_the_likeliest_other() -> Non
         laws.law("gs-c20")
     with pytest.raises(CatalogueError, match="ramp"):
         laws.law("bs0610", {"rampp": "1"})
+
+
+@pytest.mark.parametrize(("model", "axis", "words"), [("bs0610", "Z", "there are: X, Y"), ("gs-c200", "X", "one axis")])
+def test_an_axis_that_a_model_does_not_have_is_refused(model: str, axis: str, words: str) -> None:
+    with pytest.raises(CatalogueError, match=words):
+        laws.law(model, {}, axis)

@@ -17,6 +17,7 @@ from detent.tuner.map import loss_map
 from detent.tuner.search import Progress, Stopped, grid_points, search
 from detent.tuner.spaces import Point, Space, space
 from detent.tuner.task import NOMINAL, Move, Task, TunerError, moves_of
+from detent.tuner.tune import tune
 
 RIG = Rig(motor("qsh4218-41-10-035"), Drive(24, 1.0), Load(inertia=1.5e-5, friction=0.02))
 
@@ -209,3 +210,14 @@ def test_a_grid_is_widened_at_its_end_and_not_beyond_what_a_command_takes() -> N
     assert grid.wider(20) == (grid, ())
     assert all(10 < value < 40 for value in grid.near(20))
     assert grid.near(20)[len(grid.near(20)) // 2] == 20
+
+
+def test_a_supply_that_barely_drives_the_current_is_tuned_for_all_the_same() -> None:
+    """Another model of the motor that such a supply cannot drive is left out: it is no reason to say nothing."""
+    tight = Rig(motor("qsh4218-41-10-035"), Drive(4.8, 1.0), Load(inertia=1.5e-5, friction=0.02))
+    made = Task("gs-c200", tight, moves_of("30"), screened=0, final=16, at_corners=False)
+    found = tune(made)
+    assert found.found.check.lost == 0
+    names = [model.name for model in found.models]
+    assert "half steps compensated" not in names
+    assert "no damping" in names

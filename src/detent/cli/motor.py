@@ -104,6 +104,8 @@ def motor(
         for option, given in of_a_move.items():
             if given is not None and move is None:
                 raise MotorError(f"{option} is of a move: add --move STEPS")
+        many = _Variants(spread_of(vary), variants, seed)  # before a start is looked for, which takes its time
+        many.check()
         law = None if as_ is None else _Law.of(as_)
         found = made(name, rig, None if law is None else law.winding(rig.step))
         facts = _facts_of(found)
@@ -111,7 +113,6 @@ def motor(
             _curve(name, found, facts, pull_in, plot, json)
             return
         asked = _Move.of(found, move, start, slew, ramp, law)
-        many = _Variants(spread_of(vary), variants, seed)
         _judge(asked, many, facts, sensitivity, pull_in, plot, json)
     except ValueError as error:  # MotorError, SettingError, CatalogueError
         asked_wrongly(error)
@@ -357,14 +358,18 @@ class _Variants(NamedTuple):
     tried: int | None
     seed: int
 
-    def judge(self, move: _Move) -> "tuple[LossRate | None, str]":
-        """The loss rate, or why there is none."""
-        from detent.motors import engine
+    def check(self) -> None:
+        """Raise MotorError for a number that is none of variants."""
         from detent.motors.motor import MotorError
-        from detent.motors.variants import corners, loss_rate
 
         if self.tried is not None and not 0 <= self.tried <= 1_000_000:
             raise MotorError(f"--variants {self.tried}: give 0 to 1000000")
+
+    def judge(self, move: _Move) -> "tuple[LossRate | None, str]":
+        """The loss rate, or why there is none."""
+        from detent.motors import engine
+        from detent.motors.variants import corners, loss_rate
+
         if self.tried == 0:
             return None, "variants: none asked for"
         tried = VARIANTS if self.tried is None else self.tried

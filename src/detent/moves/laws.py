@@ -15,8 +15,14 @@ _MAKE = {
     "bs0710": genstepper.law,
 }
 
+_AXES = {"bs0610": ("X", "Y"), "bs0710": ("X", "Y")}  # of models with more than one
+
 
 def law(model: str, options: Mapping[str, object] | None = None, axis: str = "") -> Law:
     """How an axis of `model`, with these options (as a cell file writes them), makes moves. Raises CatalogueError."""
     found = catalogue.model(model)
+    axes = _AXES.get(found.name, ())
+    if axis and axis not in axes:
+        raise (catalogue.unknown(f"motor of a {found.name}", axis, axes) if axes
+               else catalogue.CatalogueError(f"a {found.name} has one axis: leave {axis!r} out"))  # fmt: skip
     return _MAKE[found.name](found, catalogue.option_values(found, options or {}), axis)

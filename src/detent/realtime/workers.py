@@ -7,6 +7,7 @@ ones cost more to carry about than to do.
 
 import logging
 import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from time import perf_counter
 from typing import Any, NamedTuple, Self, TypeVar
@@ -21,6 +22,9 @@ MOST = 512
 MOST_WORKERS = 256
 AHEAD = 3  # chunks for each worker that are on their way
 STARTED = 60.0  # s until the first worker must be there
+ANSWERS = 10.0  # s in which a scheduler must answer
+
+ADDRESS = re.compile(r"((tcp|tls|ws|wss|ucx|ucxx)://)?(\[[0-9a-fA-F:.]+\]|[\w.-]+):\d{1,5}")  # of a scheduler
 
 ONE_THREAD = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
@@ -51,6 +55,8 @@ class Workers:
             raise ValueError("--workers are processes of this computer, --scheduler has its own: give one of them")
         if count is not None and not 1 <= count <= MOST_WORKERS:
             raise ValueError(f"--workers {count}: say 1 to {MOST_WORKERS}")
+        if scheduler is not None and not ADDRESS.fullmatch(scheduler):
+            raise ValueError(f"--scheduler {scheduler}: write tcp://HOST:PORT, as the scheduler says where it listens")
         need("distributed", "work on several processes or machines needs")
         import distributed
 
@@ -66,7 +72,7 @@ class Workers:
                     n_workers=count or os.cpu_count() or 1, threads_per_worker=1, processes=True,
                     dashboard_address=None, host="127.0.0.1", env=ONE_THREAD, silence_logs=logging.CRITICAL,
                 )  # fmt: skip
-            self._client = make(self._cluster or scheduler, timeout=patience, set_as_default=False)
+            self._client = make(self._cluster or scheduler, timeout=min(patience, ANSWERS), set_as_default=False)
             self._client.wait_for_workers(1, timeout=patience)
         except (OSError, TimeoutError) as error:
             where = f"--scheduler {scheduler}" if scheduler else "the workers of this machine"

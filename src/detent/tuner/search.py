@@ -9,10 +9,12 @@ what that proves, the number of such looks counted, is what is said of the answe
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from detent.motors import chance
+from detent.motors.motor import MotorError
 from detent.motors.variants import percent
 from detent.tuner.grid import Dimension, points
 from detent.tuner.judge import Job, Judge, Lost, Runner, judge_of, one_by_one
@@ -327,11 +329,12 @@ class _Search:
         found = self.judge.trains(point)
         assert found is not None
         factors = dict(zip(QUANTITIES, map(float, self.task.factors((variant,))[0]), strict=True))
-        rig = changed(self.task.rig_with(found[0].winding), **factors)
         shown = ", ".join(f"{name} x{factor:.2f}" for name, factor in factors.items() if abs(factor - 1) > 5e-3)
-        for train in found[1]:
-            if (loss := diagnose(train, rig)) is not None:
-                return f"{words}; the slowest, {found[0]}, with {shown or 'the rig as given'}: {loss}"
+        with suppress(MotorError):  # of a variant whose supply no longer drives the current there is no closer look
+            rig = changed(self.task.rig_with(found[0].winding), **factors)
+            for train in found[1]:
+                if (loss := diagnose(train, rig)) is not None:
+                    return f"{words}; the slowest, {found[0]}, with {shown or 'the rig as given'}: {loss}"
         return f"{words}; the slowest, {found[0]}, is lost with {shown or 'the rig as given'}"
 
 

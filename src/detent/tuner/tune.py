@@ -1,11 +1,13 @@
 """The whole answer to a task: the settings found, and everything that says how far to believe them."""
 
+from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from detent.motors.rotor import Rig
+from detent.motors.drive import Decay
+from detent.motors.motor import MotorError
 from detent.motors.variants import QUANTITIES, Ensemble
 from detent.motors.winding import HALF, HALF_COMPENSATED
 from detent.tuner.judge import Job, Judge, Runner, judge_of, one_by_one, weighed
@@ -129,18 +131,22 @@ def models(judge: Judge, point: Point) -> tuple[Model, ...]:
     task = judge.task
     rig = task.rig_with(trains[0].winding)
     assert rig.damping is not None
-    ratio, drive = rig.damping.ratio, rig.drive
-    others: list[tuple[str, Rig]] = [("half the substep", replace(rig, substep=max(rig.substep // 2, 1)))]
+    ratio, drive, damping = rig.damping.ratio, rig.drive, rig.damping
+    changes: list[tuple[str, dict[str, Any]]] = [("half the substep", {"substep": max(rig.substep // 2, 1)})]
     if drive.decay in ("fast", "slow"):
-        other = replace(drive, decay="slow" if drive.decay == "fast" else "fast")
-        others.append((f"{other.decay} decay", replace(rig, drive=other)))
+        other: Decay = "slow" if drive.decay == "fast" else "fast"
+        changes.append((f"{other} decay", {"drive": replace(drive, decay=other)}))
     if ratio:
-        others.append((f"damping {ratio / 4:.3g}", replace(rig, damping=rig.damping._replace(ratio=ratio / 4))))
-        others.append(("no damping", replace(rig, damping=rig.damping._replace(ratio=0.0))))
-        less = rig.damping.roll_off / 2
-        others.append((f"damping rolls off at {less:g}", replace(rig, damping=rig.damping._replace(roll_off=less))))
+        changes.append((f"damping {ratio / 4:.3g}", {"damping": damping._replace(ratio=ratio / 4)}))
+        changes.append(("no damping", {"damping": damping._replace(ratio=0.0)}))
+        less = damping.roll_off / 2
+        changes.append((f"damping rolls off at {less:g}", {"damping": damping._replace(roll_off=less)}))
     if drive.winding == HALF:
-        others.append(("half steps compensated", replace(rig, drive=replace(drive, winding=HALF_COMPENSATED))))
+        changes.append(("half steps compensated", {"drive": replace(drive, winding=HALF_COMPENSATED)}))
+    others = []
+    for name, change in changes:
+        with suppress(MotorError):  # such a model is none of this rig: its supply does not drive that current
+            others.append((name, replace(rig, **change)))
     factors = task.factors(task.drawn(0, MODEL_VARIANTS))
     return tuple(Model(name, MODEL_VARIANTS, int(_lost(judge, point, Ensemble(other, factors)).sum()))
                  for name, other in others)  # fmt: skip
