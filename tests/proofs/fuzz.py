@@ -82,7 +82,7 @@ def run(
             if now - told > 10:
                 told = now
                 share = max((now - began) / seconds, total / frames)
-                left = (now - began) * (1 / share - 1)
+                left = max((now - began) * (1 / share - 1), 0.0)
                 tell(f"{total:,} frames, {share:.0%}, about {left / 60:.0f} min left")
     return found
 
