@@ -48,6 +48,8 @@ def test_a_tuned_move_is_told_with_what_is_proved_of_it(capsys: pytest.CaptureFi
         (["tune", "gs-c200", *RIG, "--moves", "100", "--travel", "9"], "--on PORT"),
         (["tune", "gs-c200", *RIG, "--moves", "100", "--each-move", "--map", "a.png"], "--each-move"),
         (["tune", "bs0610", *RIG, "--moves", "100", "--step", "half"], "step_size"),
+        (["tune", "gs-c200", *RIG, "--moves", "100", "--axis", "X"], "one axis"),
+        (["tune", "gs-c200", *RIG, "--moves", "100", "--scheduler", "nowhere"], "tcp://HOST:PORT"),
         (["tune", "gs-c2000", *RIG, "--moves", "100"], "gs-c200"),
         (["compare-moves", "gs-c200", "S=48", *RIG, "--moves", "100"], "two to 6"),
         (["compare-moves", "gs-c200", "S=48", "Q=1", *RIG, "--moves", "100"], "there are"),
