@@ -124,17 +124,9 @@ def file_of_the_eeprom_is_taken(model: str, text: str, folder: Path) -> bool:
         return False
     cell = build(parse(f'[units.u]\nmodel = "{model}"', "cell"), str)
     unit = cell.controller("u")
-    older = taken(model, source(Random(text), model))  # what it is written over
-    unit.restore((made if older is None or model != "dcb-274" else older).whole)
-    memory = bytearray(unit.kept_memory())
-    if model == "dcb-274":  # as program mode stores it: each part with its end mark, in what was there before
-        for placed in made.placed:
-            memory[placed.address : placed.address + len(placed.code)] = placed.code
-        held = {at for placed in made.placed for at in range(placed.address, placed.address + len(placed.code))}
-        for end in {placed.address + len(placed.code) for placed in made.placed} - held - set(range(193, 256)) - {2048}:
-            memory[end] = 0xFF
+    unit.restore(verbs._formatted(made, "image"))
     file = folder / "u.eeprom"
-    file.write_bytes(pack(bytes(memory), model))
+    file.write_bytes(pack(unit.kept_memory(), model))
     with redirect_stdout(StringIO()) as printed:
         try:
             verbs.disasm(model, file)

@@ -293,12 +293,15 @@ class Board(PoweredDevice):
                 if not asked.value:
                     motor.stop(now)
                 elif not motor.idle or self._rests_until[axis] <= now:
+                    self._rests_until[axis] = NEVER
                     motor.slew(asked.value, now)
                 self._note_rest(motor, now)
             if not asked.value or not motor.idle or axis in self._unheeded or self._limits.closed(axis, asked.value):
                 continue
             if self._rests_until[axis] <= now:
+                self._rests_until[axis] = NEVER
                 motor.slew(asked.value, now)
+                self._note_rest(motor, now)
             else:
                 self._again = min(self._again, self._rests_until[axis])
 
