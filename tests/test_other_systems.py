@@ -125,6 +125,8 @@ def test_a_unit_is_served_over_tcp_and_hosts_speak_to_it(elsewhere: Mapping[str,
     with serving(elsewhere, "serve", "gs-c200", "--tcp", "127.0.0.1:0", "--state", tmp_path / "kept") as ready:
         port = ready["endpoints"][0]["address"]
         assert "< Y" in done(elsewhere, "send", "gs-c200", port, "P", "+100", "E")
+        while "ready" not in done(elsewhere, "send", "gs-c200", port, "F"):  # it executes its program
+            pass
         done(elsewhere, "backup", "gs-c200", port, tmp_path / "backup.toml")
     assert "+100" in (tmp_path / "backup.toml").read_text()
     assert list((tmp_path / "kept").glob("gs-c200*"))

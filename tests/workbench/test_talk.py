@@ -119,7 +119,7 @@ def test_answers_of_the_dcb_274_are_explained_by_its_table() -> None:
     told.history.do(SetPin("dcb-274", "HOME", 0))
     told.history.do(SetPin("dcb-274", "P2", 0))
     lines = ["X", "Z", "^", "] 0", "A 129", "] 1", "[ 0 2"]
-    found = [row.note for row in exchange(told, *lines) if row.sender and row.data[:1] != b" "][1:]
+    found = [row.note for row in exchange(told, *lines) if row.sender and row.data[:1] != b" "]
     assert found[0].startswith("ramp slopes 5/5, initial velocity 802, slew velocity 10370, divide all speeds 1, ")
     assert found[1:] == [
         "position 0", "0: at rest", "active: HOME, P2", "active ports: P2", "active: none", "the bytes 235 233",

@@ -25,6 +25,8 @@ class Motion {
     this.sending = new Sending(root, this);
     this.tuning = new Tuning(root, this);
     this.number = 0;
+    this.version = 0; // of the settings; `drawn`: of those that `move` is of
+    this.drawn = 0;
     this.kept = null; // the move that is A
     this.root.addEventListener("click", (event) => {
       const tab = event.target.closest("[role=tab]"),
@@ -203,16 +205,27 @@ class Motion {
   /* -- the picture ---------------------------------------------------------------------------------------------- */
 
   changed() {
+    this.version++;
     clearTimeout(this.moveSoon);
     this.moveSoon = setTimeout(() => this.draw(), MOVE_AFTER);
     this.judgeLater();
   }
 
+  /* The move of the settings as they stand, even where it is not drawn yet; undefined if there is none. */
+  async settled() {
+    while (!this.closed && this.drawn !== this.version) if (!(await this.draw())) return undefined;
+    return this.closed ? undefined : this.move;
+  }
+
+  /* Whether the server gave an answer; one that came too late for the settings is not shown. */
   async draw() {
+    clearTimeout(this.moveSoon);
     const number = ++this.number,
+      { version } = this,
       move = await this.ask("motion_move", this.wanted);
-    if (!move || this.closed || number !== this.number) return;
+    if (!move || this.closed || number !== this.number) return Boolean(move);
     this.move = move;
+    this.drawn = version;
     this.paint();
     const more = Object.entries(this.options).map(([name, value]) => `option ${name} = "${value}"`);
     this.find(".motion-lines").replaceChildren(
@@ -225,6 +238,7 @@ class Motion {
       this.find(".motion-told").textContent =
         "This table is no command: it is burnt into the drive's EPROM, or stands in the cell file as option table.";
     this.root.dataset.drawn = number;
+    return true;
   }
 
   /* The move, and A behind it, over one time. */
@@ -416,15 +430,17 @@ class Motion {
 
   get deeds() {
     return {
-      send: () => this.sending.settings(this.move.settings),
-      move: () => this.sending.move([...this.move.settings, this.move.go]),
+      send: () => this.whenSendable("send", (move) => this.sending.settings(move.settings)),
+      move: () => this.whenSendable("move", (move) => this.sending.move([...move.settings, move.go])),
       now: () => this.show(this.tab),
-      keep: () => {
-        this.kept = this.current();
-        this.paint();
-        if (this.judged) this.paintTorque();
-      },
+      keep: () =>
+        this.whenSettled(() => {
+          this.kept = this.current();
+          this.paint();
+          if (this.judged) this.paintTorque();
+        }),
       swap: async () => {
+        if (!(await this.settled())) return;
         const back = this.kept;
         this.kept = this.current();
         if (!(await this.show(this.tab, back.options))) return;
@@ -438,10 +454,22 @@ class Motion {
         this.paint();
         if (this.judged) this.paintTorque();
       },
-      csv: () => exported(this, "csv"),
-      png: () => exported(this, "png"),
+      csv: () => this.whenSettled(() => exported(this, "csv")),
+      png: () => this.whenSettled(() => exported(this, "png")),
       ...this.tuning.deeds,
     };
+  }
+
+  /* What a key does, with the move that is meant and not with the one that was drawn last. */
+  async whenSettled(act) {
+    const move = await this.settled();
+    if (move) await act(move);
+  }
+
+  /* The same for what goes to a unit: nothing does if the settings that are meant are no commands. */
+  async whenSendable(key, act) {
+    const move = await this.settled();
+    if (move && !this.find(`[data-key=${key}]`).disabled) await act(move);
   }
 
   current() {

@@ -19,25 +19,21 @@ export class Sending {
     });
   }
 
-  get real() {
-    return this.motion.about.real;
-  }
-
-  async settings(lines) {
-    if (this.real && !(await this.shown(lines))) return;
-    await this.send(lines);
+  async settings(lines, words = "") {
+    const { about } = this.motion;
+    if (about.real && !(await this.shown(about, lines, words))) return;
+    await this.send(about, lines);
   }
 
   async move(lines) {
-    if (this.real && !(await this.shown(lines, "The motor moves."))) return;
-    await this.send(lines);
+    await this.settings(lines, "The motor moves.");
   }
 
-  /* Show the lines with what is to be known of them; whether they shall be sent. */
-  shown(lines, words = "") {
+  /* Show the lines with what is to be known of them; whether they shall be sent to the unit of `about`. */
+  shown(about, lines, words = "") {
     const { dialog } = this,
-      { unit, model } = this.motion.about;
-    dialog.querySelector("h2").textContent = `To ${unit}${this.real ? ", a real unit" : ", in the cell"} (${model})`;
+      { unit, model, real } = about;
+    dialog.querySelector("h2").textContent = `To ${unit}${real ? ", a real unit" : ", in the cell"} (${model})`;
     dialog.querySelector("p").textContent = words;
     dialog.querySelector("ol").replaceChildren(...lines.map((line) => element("li", {}, line)));
     dialog.returnValue = "";
@@ -48,19 +44,19 @@ export class Sending {
     });
   }
 
-  /* Line by line; nothing follows a line that is refused. */
-  async send(lines) {
-    const { unit } = this.motion.about,
-      sent = [];
+  /* Line by line, to the unit that they were shown for, whatever the page shows by now; nothing follows a line that is
+     refused. */
+  async send({ unit, real }, lines) {
+    const sent = [];
     for (const line of lines) {
-      if (this.real) {
+      if (real) {
         const said = await this.motion.ask("unit_say", unit, line);
         if (!said) return this.tell(sent, line, "was not sent");
         if (said.refused) return this.tell(sent, line, `was refused: ${said.meaning || said.answers.join(" ")}`);
       } else if ((await this.motion.ask("type", unit, line)) === undefined) return this.tell(sent, line, "was not sent");
       sent.push(line);
     }
-    this.told.textContent = `sent: ${sent.join(", ")}; the answers are on the ${this.real ? "Unit" : "Terminal"} page`;
+    this.told.textContent = `sent: ${sent.join(", ")}; the answers are on the ${real ? "Unit" : "Terminal"} page`;
     return true;
   }
 

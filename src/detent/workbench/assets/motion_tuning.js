@@ -177,13 +177,13 @@ export class Tuning {
       take: () => this.motion.take(this.found),
       "send-found": async () => {
         const { commands, resets } = this.found,
-          { sending } = this.motion;
+          { sending, about } = this.motion;
         const words = resets.length
           ? `${resets.join(", ")} resets the board: it stops, its position becomes 0, and moves are counted in other microsteps.`
           : "";
-        if (!(await sending.shown(commands, words))) return;
+        if (!(await sending.shown(about, commands, words))) return;
         await this.motion.take(this.found);
-        if (!(await sending.send(commands))) return;
+        if (!(await sending.send(about, commands))) return;
         this.motion.find(".motion-told").scrollIntoView({ block: "nearest" });
       },
       copy: async () => {
