@@ -120,8 +120,8 @@ def smc_program(draw: Random) -> Program:
     return Program(tuple(lines), {1: changes(draw)})
 
 
-def smc_runs_as_the_manual_says(_: History, program: Program) -> bool:
-    bench = ready(dcb274.MODELS[0], History({}, (), ()))
+def store(bench: Bench, program: Program) -> None:
+    """Type a program into program mode of a DCB-274, each part at its address, and leave that mode."""
     here = None
     for line in program.lines:
         if line.address != here:
@@ -129,7 +129,13 @@ def smc_runs_as_the_manual_says(_: History, program: Program) -> bool:
             bench.play((Say(f"P {line.address}"), Wait(5 * MS)))
         bench.play((Say(f"{line.letter} {' '.join(map(str, line.numbers))}"), Wait(8 * MS)))
         here = line.address + Smc.LENGTHS[line.letter]
-    bench.play((Say("P"), Wait(5 * MS), Say("G 0")))
+    bench.play((Say("P"), Wait(5 * MS)))
+
+
+def smc_runs_as_the_manual_says(_: History, program: Program) -> bool:
+    bench = ready(dcb274.MODELS[0], History({}, (), ()))
+    store(bench, program)
+    bench.play((Say("G 0"),))
     begun = play(bench, program, {1: "P1"}, 2 * SECOND)
     port = Input(tuple(begun + at for at in program.changes[1]))
     plain = Smc({line.address: line for line in program.lines}, stepped(bench), port, bench.now)
@@ -173,14 +179,7 @@ def special_program(draw: Random) -> Program:
 def special_trips_act_at_their_very_step(_: History, program: Program) -> bool:
     """ "There actions are performed in real time" (page 42)."""
     bench = ready(dcb274.MODELS[0], History({}, (), ()))
-    here = None
-    for line in program.lines:
-        if line.address != here:
-            bench.play(() if here is None else (Say("P"), Wait(5 * MS)))
-            bench.play((Say(f"P {line.address}"), Wait(5 * MS)))
-        bench.play((Say(f"{line.letter} {' '.join(map(str, line.numbers))}"), Wait(8 * MS)))
-        here = line.address + Smc.LENGTHS[line.letter]
-    bench.play((Say("P"), Wait(5 * MS)))
+    store(bench, program)
     bench.out.clear()
     bench.play((Say("G 0"),))
     begun = play(bench, program, {}, 2 * SECOND)
