@@ -12,6 +12,7 @@ from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
+from detent.realtime.boards.link import Link
 from detent.realtime.boards.opening import boards_of, make_ready
 from detent.realtime.boards.plan import Plan, plan
 from detent.realtime.boards.replies import HeldStores
@@ -20,6 +21,17 @@ from detent.realtime.boards.states import News
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace
 from detent.ticks import MS, SECOND, US, Ns
+
+
+class Wire(FakePort):
+    """A fake board whose host may be kept away just before it writes: what it writes comes when it does."""
+
+    def __init__(self, board: FakeBoard, clock: Callable[[], Ns], **given: Any) -> None:
+        super().__init__(board, **given)
+        self._clock = clock
+
+    def send(self, data: bytes, wall: Ns) -> None:
+        super().send(data, max(wall, self._clock()))
 
 
 def no_file(name: str) -> str:
@@ -55,8 +67,11 @@ class Bench:
         port: Mapping[str, Any] | None = None,
         board: Mapping[str, Any] | None = None,
         read: Callable[[str], str] = no_file,
+        away: Callable[[bool], Ns] = lambda writing: 0,
     ) -> None:
+        """`away`: for how long the computer is elsewhere, at each look at its clock, and (True) before each write."""
         self.wall = 1_000 * SECOND
+        self._away = away
         self._jitter, self._until = jitter, self.wall
         described = parse(text, "cell.toml")
         trial = build(described, read, record=False)
@@ -70,7 +85,7 @@ class Bench:
             self.machines[name] = machine_of(described, self.plan, name, switches or {})
             fake = FakeBoard(self.machines[name], **{"moves": 400, **(board or {})})
             fake.kept_log = False
-            self.ports[name] = FakePort(fake, **(port or {}))
+            self.ports[name] = Wire(fake, lambda: self.look(True), **(port or {}))
             return self.ports[name]
 
         self.boards = boards_of(self.plan, open_port)
@@ -79,14 +94,29 @@ class Bench:
         given = {self.plan.inputs[name]: level for name, level in levels.items()}
         self.cell: Cell = build(described, read, store=self.stores.save, line_timing=line_timing, inputs=given)
         self.news: list[News] = []
-        self.driven = Driven(
-            self.cell, self.boards, self.plan, self.stores, wall=lambda: self.wall, tell=self.news.append
-        )
+        self.driven = Driven(self.cell, self.boards, self.plan, self.stores, wall=self.look, tell=self.news.append)
+        for board in self.boards.boards.values():
+            self._slow(board.core.link)
         self.pace = Pace(1, origin=self.cell.now, clock=self.driven.clock)
         self.loop = Loop(self.driven, self.pace, [], companion=self.driven, wait=self._wait)
         self.loop._tell = self._hear  # type: ignore[method-assign]
         self.driven.begin(self.pace, levels)
         self.heard: list[list[tuple[Ns, Ns, int]]] = [[] for _ in self.cell.lines]
+
+    def _slow(self, link: Link) -> None:
+        """Whatever is said to a board takes its time, too."""
+        send = link.send
+
+        def slowly(message: bytes) -> None:
+            self.look()
+            send(message)
+
+        link.send = slowly  # type: ignore[method-assign]
+
+    def look(self, writing: bool = False) -> Ns:
+        """The computer looks at its clock."""
+        self.wall += self._away(writing)
+        return self.wall
 
     def close(self) -> None:
         self.loop.close()

@@ -4,8 +4,9 @@ A board is told what it received and what the wall clock says, and gives bytes t
 `Ready` or `Refusal` is the first event. See `several.Boards` for what a cell uses.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
+from functools import partial
 
 from detent.outputs.steps import Scale
 from detent.realtime.boards.clock import Clock
@@ -23,6 +24,7 @@ from detent.ticks import MS, SECOND, Ns
 
 PIECE = 40  # bytes of the dictionary in one answer
 NO_ANSWER: WallNs = 5 * SECOND  # at the start
+ATTEMPTS = 4  # to make a batch before it is stale
 DYING: WallNs = 700 * MS  # what a host before us has queued is over by then
 
 
@@ -161,8 +163,8 @@ class Board:
             times += self._equipment.deadlines()
         return min((at for at in times if at is not None), default=None)
 
-    def due(self, wall: WallNs) -> None:
-        """Whatever is due: sent again, asked again, clocks, watchdogs, counts."""
+    def due(self, wall: WallNs, clock: Callable[[], WallNs] | None = None) -> None:
+        """Whatever is due: sent again, asked again, clocks, watchdogs, counts. `clock` as in `commit`."""
         if self.state in _STILL:
             return
         core = self.core
@@ -182,15 +184,41 @@ class Board:
             self._probes.ask(wall)
         if self.state is State.READY:
             self._equipment.due(wall)
+            if self._equipment.hungry(wall):
+                self._give(self._equipment.feed, wall, clock)
         core.link.flush(wall)
 
-    def commit(self, now: Ns, wall: WallNs) -> None:
-        """The cell is at `now`: send what is certain."""
+    def commit(self, now: Ns, wall: WallNs, clock: Callable[[], WallNs] | None = None) -> None:
+        """The cell is at `now`: send what is certain.
+
+        With a `clock` (the wall's) it is looked at again when everything is ready to be written: what has gone stale
+        meanwhile, because the computer was elsewhere, is taken back and made anew. Write at once what `take` gives.
+        """
         if self.state is not State.READY:
             return
-        if self._equipment.commit(now, wall):
+        self._equipment.talk(wall)
+        self._give(partial(self._equipment.commit, now), wall, clock)
+
+    def _give(self, work: Callable[[WallNs], bool], wall: WallNs, clock: Callable[[], WallNs] | None) -> None:
+        """Do `work`, which says things that have a time, until it was quick enough; it tells whether it waits."""
+        link, patience = self.core.link, self.setup.margin // 2
+        link.flush(wall)
+        for _ in range(1 if clock is None else ATTEMPTS):
+            undo = None if clock is None else self._equipment.kept()
+            waits = work(wall)
+            link.flush(wall)
+            if clock is None or undo is None:
+                break
+            after = clock()
+            if after - wall <= patience:
+                break
+            undo()
+            wall = after
+        else:
+            waits = work(wall)  # this computer is too slow for its margin, and does what it can
+            link.flush(wall)
+        if waits:
             self.inquire(wall)
-        self.core.link.flush(wall)
 
     def heard(self) -> WallNs | None:
         """Whatever its stops did up to this wall time was told; None: none of them can do anything."""

@@ -8,6 +8,7 @@ from detent.outputs.steps import Scale
 from detent.realtime.boards.clock import Clock, nearest
 from detent.realtime.boards.dictionary import BARE, Dictionary, Message, Value
 from detent.realtime.boards.events import Event
+from detent.realtime.boards.fresh import Undo, kept, together
 from detent.realtime.boards.link import Link
 from detent.realtime.boards.setup import BoardSetup
 from detent.realtime.pace import WallNs
@@ -49,6 +50,15 @@ class MoveQueue:
     def forget(self, oid: int) -> None:
         """The firmware has dropped what `oid` had queued."""
         self._held.pop(oid, None)
+
+    def kept(self) -> Undo:
+        """As it is now, again."""
+        held = {oid: ticks.copy() for oid, ticks in self._held.items()}
+
+        def undo() -> None:
+            self._held = held
+
+        return undo
 
 
 @dataclass
@@ -125,6 +135,10 @@ class Core:
             return False
         question.then(message, wall)
         return True
+
+    def kept(self) -> Undo:
+        """As it is now, again: nothing of what is said from now on has been said."""
+        return together((kept(self), kept(self.link), self.queue.kept()))
 
     def forget_questions(self) -> None:
         """Nobody wants to know any more."""

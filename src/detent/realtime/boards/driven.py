@@ -89,7 +89,7 @@ class Driven(Mishaps):
         """The cell is at its present: deal with what came from the boards, and give them what is certain."""
         wall = self._wall()
         if self._due is not None and self._due <= wall:  # what came since may be due sooner: then it wakes the loop
-            self.boards.due(wall)
+            self.boards.due(wall, self._wall)
         if self.abandoned:
             self.boards.events()
             return
@@ -155,7 +155,7 @@ class Driven(Mishaps):
         for axle in self.axles:
             if axle.what.enable:
                 self.boards.outs[axle.what.enable].now(False)
-        self.boards.commit(self.cell.now, self._wall())
+        self.boards.commit(self.cell.now, self._wall(), self._wall)
         self.boards.close()
         self.on_moving(False)
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from detent.realtime.boards.core import Core
 from detent.realtime.boards.dictionary import Value
 from detent.realtime.boards.drivers import Driver, Wire
+from detent.realtime.boards.fresh import Undo, kept, together
 from detent.realtime.boards.inputs import Inputs
 from detent.realtime.boards.outs import DigitalOut
 from detent.realtime.boards.setup import DriverSetup, InputSetup, SetupProblem
@@ -131,9 +132,23 @@ class Equipment:
         waits, heard = False, self.heard()
         for out in self.outs.values():
             waits |= out.commit(wall, heard)
+        return waits
+
+    def talk(self, wall: WallNs) -> None:
+        """Begin to write to driver chips what was commanded: that has no time of its own."""
         for driver in self.drivers.values():
             driver.commit(wall)
-        return waits
+
+    def kept(self) -> Undo:
+        """As it is now, again: what `commit` and `feed` change."""
+        changing: list[Undo] = [self._core.kept()]
+        for name, stop in self.stops.items():
+            if stop.pending:
+                changing.append(kept(stop))
+            if stop.pending or not self.steppers[name].resting:
+                changing.append(self.steppers[name].kept())
+        changing += [kept(out) for out in self.outs.values() if not out.dead]
+        return together(changing)
 
     def deadlines(self) -> list[WallNs | None]:
         """When watchdogs are to be fed and counts compared."""
@@ -142,12 +157,21 @@ class Equipment:
             *(axis.proof_due() for axis in self.steppers.values()),
         ]
 
-    def due(self, wall: WallNs) -> None:
-        """Feed watchdogs and compare counts, where it is time."""
+    def hungry(self, wall: WallNs) -> bool:
+        """Whether a watchdog wants to be fed."""
+        return any(at is not None and wall >= at for at in (out.deadline() for out in self.outs.values()))
+
+    def feed(self, wall: WallNs) -> bool:
+        """Feed watchdogs. Whether an output waits until stops were heard of."""
+        waits, heard = False, self.heard()
         for out in self.outs.values():
             at = out.deadline()
             if at is not None and wall >= at:
-                out.commit(wall, self.heard())
+                waits |= out.commit(wall, heard)
+        return waits
+
+    def due(self, wall: WallNs) -> None:
+        """Compare counts, where it is time."""
         for axis in self.steppers.values():
             at = axis.proof_due()
             if at is not None and wall >= at:

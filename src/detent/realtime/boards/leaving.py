@@ -147,7 +147,7 @@ class Leaving:
     def commit(self) -> None:
         """Give the boards what is certain, at once."""
         self._committed = self._wall()
-        self.boards.commit(self.cell.now, self._committed)
+        self.boards.commit(self.cell.now, self._committed, self._wall)
         self._pending = False
 
     @property

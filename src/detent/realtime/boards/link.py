@@ -10,7 +10,7 @@ The number at the start is not known, as a board keeps it while hosts come and g
 from collections import deque
 from typing import NamedTuple
 
-from detent.realtime.boards.frames import END, ROOM, SEQUENCES, Block, Reader, block
+from detent.realtime.boards.frames import END, ROOM, SEQUENCES, SMALLEST, Block, Reader, block
 from detent.realtime.pace import WallNs
 from detent.ticks import MS
 
@@ -63,6 +63,15 @@ class Link:
     def idle(self) -> bool:
         """Whether everything sent is acknowledged, and nothing waits."""
         return not self._waiting and not self._under_way
+
+    @property
+    def spare(self) -> int:
+        """So many bytes of messages may be sent at once: what waits for an acknowledgement may leave too late."""
+        blocks = MOST_UNDER_WAY - len(self._under_way)
+        room = blocks * ROOM
+        if self.window is not None:
+            room = min(room, self.window - SMALLEST * blocks - self._bytes_under_way)
+        return room - sum(map(len, self._waiting))
 
     @property
     def backlog(self) -> int:

@@ -6,7 +6,7 @@ Their line is drawn anew every second: at rest where it should be, in motion fro
 the estimate two seconds later, so that no pulse jumps.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from detent.outputs.steps import Scale
 from detent.realtime.boards.board import Board, State
@@ -154,8 +154,11 @@ class Boards:
         """Whether every board is."""
         return all(board.state is State.READY for board, _ in self._pairs)
 
-    def commit(self, now: Ns, wall: WallNs) -> None:
-        """The cell has been run to `now` and everything it did was told: give the boards what is certain, at once."""
+    def commit(self, now: Ns, wall: WallNs, clock: Callable[[], WallNs] | None = None) -> None:
+        """The cell has been run to `now` and everything it did was told: give the boards what is certain, at once.
+
+        With a `clock` nothing leaves that has gone stale on the way: see `Board.commit`.
+        """
         self._committed = wall
         if self._aligned is not None and now - self._redrawn >= REDRAW_EVERY:
             self._redrawn = now
@@ -167,9 +170,11 @@ class Boards:
                 for stepper in board.steppers.values():
                     stepper.rescale()
         for board, port in self._pairs:
-            board.commit(now, wall)
-            board.release_suppressed(wall)
+            board.commit(now, wall, clock)
             self._pump(board, port, wall)
+            board.release_suppressed(wall)
+            if clock is not None:
+                wall = max(wall, clock())
 
     def commit_at(self) -> WallNs | None:
         """When `commit` is wanted though nothing new was told: pulses become certain, outputs fall due."""
@@ -238,13 +243,13 @@ class Boards:
             times += [at for at in (board.deadline(), port.deadline()) if at is not None]
         return min(times, default=None)
 
-    def due(self, wall: WallNs) -> None:
-        """It is `deadline`; may be called at any time."""
+    def due(self, wall: WallNs, clock: Callable[[], WallNs] | None = None) -> None:
+        """It is `deadline`; may be called at any time. `clock` as for `commit`."""
         for board, port in self._pairs:
             at = port.deadline()
             if at is not None and wall >= at:
                 self._read(board, port, wall)
-            board.due(wall)
+            board.due(wall, clock)
             if board.state is State.READY:
                 self._new_clock(board, wall)
             self._pump(board, port, wall)

@@ -6,7 +6,7 @@ its mind about later has then not left, or is given at the same times by the new
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.outputs.steps import Run, Runs
@@ -14,6 +14,7 @@ from detent.pulses import Train
 from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.dictionary import Message, Value
 from detent.realtime.boards.events import CountDiffers, Slipped
+from detent.realtime.boards.fresh import Undo, kept, together
 from detent.realtime.boards.setup import StepperSetup
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, SECOND, Ns
@@ -21,6 +22,7 @@ from detent.ticks import MS, SECOND, Ns
 LONGEST = 64  # steps of a run: looking further ahead costs more than it saves where a commit cuts runs anyway
 NOWHERE = -(1 << 62)  # before everything: the first run gets a base of its own
 SETTLED: Ns = 20 * MS  # a rest longer than the lag by this takes it back to 0
+ONE_RUN = 40  # bytes of messages at most, with a direction and a clock
 SPARE = 4  # entries of the move queue that are left to outputs
 
 
@@ -275,6 +277,17 @@ class Stepper:
         self._runs = self._make(span)
         return self._runs
 
+    def kept(self) -> Undo:
+        """As it is now, again: nothing of what is sent from now on was sent."""
+        spans = deque(replace(span) for span in self._spans)
+        undo = together((kept(self), *(kept(channel) for channel in self._channels)))
+
+        def back() -> None:
+            undo()
+            self._spans, self._runs = spans, None
+
+        return back
+
     def rescale(self) -> None:
         """The scale of cell time to ticks has changed: what is sent from now on follows it."""
         self._runs = None
@@ -291,7 +304,8 @@ class Stepper:
         ):
             return  # what waits a little makes longer runs, and there is time
         self._sent_at = wall
-        while span.next <= upto and room > 0:
+        # what would have to wait for an acknowledgement is made when it has come: it might be late by then
+        while span.next <= upto and room > 0 and core.link.spare >= ONE_RUN:
             run = runs.one(upto)
             self._put(channel, run, up)
             room -= 2  # a run behind a long rest takes two entries
