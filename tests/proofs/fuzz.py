@@ -9,8 +9,8 @@ import re
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor
 from itertools import count
 from pathlib import Path
 from typing import Any, Final
@@ -20,7 +20,7 @@ from tests.proofs import cells, parsers, units
 from tests.proofs.tally import Tally
 
 CASES: Final = Path(__file__).parent / "cases"
-BATCH: Final = {"unit": 100, "cell": 20, "read": 2000}  # cases that a process does in one go
+BATCH: Final = {"unit": 100, "cell": 5, "read": 200}  # cases that a process does in one go: a second or so
 SHARE: Final = {"unit": 0.75, "cell": 0.2, "read": 0.05}  # of the time
 TRIES: Final = 300  # of making a case smaller
 _KINDS: Final = {kind.__name__: kind for kind in (Say, Raw, Put, Power, Wait)}
@@ -54,27 +54,25 @@ def run(
 ) -> dict[str, Tally]:
     """Fuzz until one of both is reached, on so many processes; the tallies by target."""
     found = {target: Tally() for target in targets()}
-    spent = dict.fromkeys(BATCH, 0.0)
-    numbers: dict[str, Iterator[int]] = {target: count(first, BATCH[target.partition(" ")[0]]) for target in found}
+    spent = dict.fromkeys(found, 0.0)  # seconds of a core
+    numbers: dict[str, Iterator[int]] = {target: count(first, BATCH[_kind(target)]) for target in found}
     began = told = time.monotonic()
-    turn = {kind: iter(_round([t for t in found if t.startswith(kind)])) for kind in BATCH}
     with ProcessPoolExecutor(jobs) as pool:
-        pending: dict[Any, tuple[str, float]] = {}
+        pending: dict[Future[tuple[Tally, float]], str] = {}
 
         def submit() -> None:
-            kind = min(BATCH, key=lambda one: spent[one] / SHARE[one])
-            target = next(turn[kind])
-            spent[kind] += 1e-6
-            pending[pool.submit(_timed, target, next(numbers[target]), BATCH[kind])] = (target, time.monotonic())
+            target = due(spent)
+            spent[target] += 1e-3  # what is under way counts a little, so that the next process takes another
+            pending[pool.submit(_timed, target, next(numbers[target]), BATCH[_kind(target)])] = target
 
         for _ in range(jobs + 1):
             submit()
         while pending:
             done = next(iter(pending))  # in the order in which they were begun
             tally, took = done.result()
-            target, _ = pending.pop(done)
+            target = pending.pop(done)
             found[target].add(tally)
-            spent[target.partition(" ")[0]] += took
+            spent[target] += took
             now = time.monotonic()
             total = sum(one.frames for one in found.values())
             if now - began < seconds and total < frames:
@@ -87,14 +85,20 @@ def run(
     return found
 
 
+def due(spent: Mapping[str, float]) -> str:
+    """The target whose turn it is: of the kind that is furthest behind its share, the one with the least so far."""
+    kinds = {kind: sum(took for target, took in spent.items() if _kind(target) == kind) for kind in SHARE}
+    kind = min(kinds, key=lambda one: kinds[one] / SHARE[one])
+    return min((target for target in spent if _kind(target) == kind), key=lambda one: spent[one])
+
+
+def _kind(target: str) -> str:
+    return target.partition(" ")[0]
+
+
 def _timed(target: str, first: int, most: int) -> tuple[Tally, float]:
     began = time.process_time()
     return batch(target, first, most), time.process_time() - began
-
-
-def _round(names: list[str]) -> Iterator[str]:
-    while True:
-        yield from names
 
 
 # -- cases that failed --------------------------------------------------------------------------------------

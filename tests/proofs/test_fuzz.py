@@ -30,6 +30,20 @@ def test_many_cases_of_every_target_hold(target: str, tmp_path: Path, monkeypatc
     assert not [path.read_text() for path in tmp_path.iterdir()]
 
 
+def test_a_short_run_reaches_everything_in_its_share_of_the_time() -> None:
+    """A batch of a reader takes 0.3 s here, of a unit 1 s, of cells 2 s: after so many batches all have been met."""
+    takes = {"unit": 1.0, "cell": 2.0, "read": 0.3}
+    spent = dict.fromkeys(fuzz.targets(), 0.0)
+    for _ in range(200):
+        target = fuzz.due(spent)
+        spent[target] += takes[target.partition(" ")[0]]
+    assert all(spent.values())
+    total = sum(spent.values())
+    for kind, share in fuzz.SHARE.items():
+        of_kind = sum(took for target, took in spent.items() if target.startswith(kind))
+        assert abs(of_kind / total - share) < 0.03, kind
+
+
 def test_a_case_that_fails_is_made_small_and_fails_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A unit that breaks at a frame: what is kept is that frame."""
     monkeypatch.setattr(fuzz, "CASES", tmp_path)
