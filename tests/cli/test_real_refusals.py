@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from detent.cell.description import Problem
 from detent.cli import main
 from detent.realtime.boards import drive
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.chips import Chip, Chips
 from detent.realtime.boards.fake.port import FakePort
+from detent.realtime.boards.opening import NotYet
 from detent.realtime.boards.ports import open_port
 from detent.realtime.service import Service
 
@@ -80,6 +82,9 @@ CASES: dict[str, tuple[Change, Callable[[FakeBoard], FakePort], str, str]] = {
 }  # fmt: skip
 
 
+MAY_PASS = {"no board", "no serial device", "another device", "a driver that does not answer"}
+
+
 @pytest.mark.parametrize("verb", ["boards check", "serve"])
 @pytest.mark.parametrize("case", CASES, ids=[name.replace(" ", "-") for name in CASES])
 def test_it_is_one_line_with_file_key_and_remedy(
@@ -115,8 +120,17 @@ def test_it_is_one_line_with_file_key_and_remedy(
     words = ["boards", "check", str(cell), "--yes"] if verb == "boards check" else [
         "serve", str(cell), "--real", "--tcp", "127.0.0.1:0", "--state", str(tmp_path / "state"),
     ]  # fmt: skip
+    kinds: list[type[Problem]] = []
+    made = Problem.__init__
+
+    def noted(problem: Problem, *given: str) -> None:
+        kinds.append(type(problem))
+        made(problem, *given)
+
+    monkeypatch.setattr(Problem, "__init__", noted)
     with pytest.raises(SystemExit) as end:
         main(words)
+    assert (kinds[-1] is NotYet) is (case in MAY_PASS), "whether a service waits for it"
     told = capsys.readouterr()
     assert (end.value.code, told.out) == (2, ""), told.err
     assert told.err.startswith(f"detent: {cell}: {key}"), told.err

@@ -10,7 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from detent.cli import main
+from detent.cell.description import Problem
+from detent.cli import main, serve
+from detent.realtime.boards.opening import NotYet
+from detent.realtime.endpoints.endpoint import EndpointError
+from detent.realtime.notify import Notifier
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BY_ID = "/dev/serial/by-id"
@@ -116,6 +120,43 @@ def test_asked_wrongly(words: tuple[str, ...], error: str, cell: Path, capsys: p
     assert (status, out) == (2, "")
     assert error in err
     assert err.count("\n") == 1
+
+
+def test_what_may_pass_is_waited_for_and_told_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At power-on a board boots, a driver has no supply yet, a port has no owner: nothing for which a box gives up."""
+    attempts: list[Exception | str] = [
+        NotYet("cell.toml", "boards.b.serial", "it does not answer"),
+        NotYet("cell.toml", "boards.b.serial", "it does not answer"),
+        EndpointError("/dev/ttyS0 cannot be opened: Permission denied"),
+        NotYet("cell.toml", "boards.b.serial", "it does not answer"),
+        "served",
+    ]
+    slept: list[float] = []
+    monkeypatch.setattr("time.sleep", slept.append)
+
+    def opened() -> object:
+        found = attempts.pop(0)
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    assert serve._wait({}, opened, Notifier({})) == "served"  # type: ignore[arg-type,comparison-overlap]
+    told = capsys.readouterr().err.splitlines()
+    assert told == [
+        "detent: cell.toml: boards.b.serial: it does not answer; trying again",
+        "detent: /dev/ttyS0 cannot be opened: Permission denied; trying again",
+    ]
+    assert len(slept) == 4
+
+
+def test_what_no_waiting_mends_ends_it() -> None:
+    def opened() -> object:
+        raise Problem("cell.toml", "hardware.x.step", "the board has no pin gpio99")
+
+    with pytest.raises(Problem, match="gpio99"):
+        serve._wait({}, opened, Notifier({}))  # type: ignore[arg-type]
 
 
 def test_serve_is_ready_is_alive_and_says_when_it_stops(tmp_path: Path) -> None:

@@ -67,7 +67,8 @@ class Board(_Table):
     error: ErrorField = 1 * US
     """How far a pulse may be from its time, 100 us at most; `exact`: the nearest tick."""
     watchdog: DurationField = 2 * SECOND
-    """`enable` pins let go when nobody has refreshed them for so long: 200 ms and four leads at least."""
+    """Drivers are let go, and outputs fall to their levels at rest, when nobody has refreshed them for so long: 200 ms
+    and four leads at least."""
     replies: Literal["held", "at once"] = "held"
     """Hosts hear what is said when nothing can change it any more, a lead and 5 ms later; or at once."""
 

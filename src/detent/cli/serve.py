@@ -5,7 +5,8 @@ import json as json_text
 import math
 import os
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from detent.realtime.endpoints.tcp import TcpAddress
     from detent.realtime.notify import Notifier
     from detent.realtime.service import Served, Service
+
+RETRY = 2.0  # seconds until what is there and does not answer is asked again
 
 
 def serve(
@@ -87,6 +90,7 @@ def serve(
     from detent.cell.description import Problem
     from detent.cli.codes import FAILED
     from detent.cli.endings import asked_wrongly, failed
+    from detent.realtime.appearing import devices
     from detent.realtime.boards.drive import take_priority
     from detent.realtime.cell_source import find_cell
     from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost
@@ -116,12 +120,16 @@ def serve(
     allow_many()
     try:
         try:
-            if wait:
-                _wait(found.description, endpoints, real, notifier)
             pins = _real_pins(notifier) if real else None
-            service = Service(found.description, found.read, endpoints, pace=pace, line_timing=line_timing,
-                              images=images, observed=control_at is not None, on_stop=_tell_stop,
-                              real=pins, timers=(notifier,))  # fmt: skip
+            on_wire = (lambda text: _tell_wire(text, notifier)) if real or wait else None
+
+            def opened() -> Service:
+                return Service(found.description, found.read, endpoints, pace=pace, line_timing=line_timing,
+                               images=images, observed=control_at is not None, on_stop=_tell_stop,
+                               real=pins, timers=(notifier,), on_wire=on_wire)  # fmt: skip
+
+            needed = devices(found.description, endpoints, real=real)
+            service = _wait(needed, opened, notifier) if wait else opened()
             url = _control(service, control_at, token)
         except (Problem, EndpointError) as error:
             asked_wrongly(error)
@@ -205,18 +213,33 @@ def _control(service: "Service", address: "TcpAddress | None", token: str | None
     return http.url
 
 
-def _wait(description: "Description", endpoints: "Sequence[EndpointSpec]", real: bool, notifier: "Notifier") -> None:
-    """Until every device is there; told once which are not."""
-    from detent.realtime.appearing import devices, wait_for
+def _wait(needed: "Mapping[str, str]", opened: "Callable[[], Service]", notifier: "Notifier") -> "Service":
+    """Until every device is there and does what it should; told once which are not. Raises Problem."""
+    from detent.realtime.appearing import wait_for
+    from detent.realtime.boards.opening import NotYet
+    from detent.realtime.endpoints.endpoint import EndpointError
 
-    needed = devices(description, endpoints, real=real)
+    told: set[str] = set()
 
-    def tell(missing: Sequence[str]) -> None:
-        text = "waiting for " + ", ".join(f"{device} ({needed[device]})" for device in missing)
-        print(f"detent: {text}", file=sys.stderr, flush=True)
+    def tell(text: str) -> None:
+        if text not in told:
+            told.add(text)
+            print(f"detent: {text}", file=sys.stderr, flush=True)
         notifier.status(text)
 
-    wait_for(list(needed), tell)
+    while True:
+        wait_for(list(needed), lambda missing: tell("waiting for " + ", ".join(f"{d} ({needed[d]})" for d in missing)))
+        try:
+            return opened()
+        except (NotYet, EndpointError) as error:
+            tell(f"{error}; trying again")
+        time.sleep(RETRY)
+
+
+def _tell_wire(text: str, notifier: "Notifier") -> None:
+    """A serial port went away, or came back."""
+    print(f"{'<4>' if notifier.heard else ''}detent: {text}", file=sys.stderr, flush=True)
+    notifier.status(text)
 
 
 def _real_pins(notifier: "Notifier") -> "RealPins":
@@ -335,6 +358,8 @@ def _what(endpoint: "Served") -> str:
 
 def _print_end(service: "Service") -> None:
     print(f"Ended after {service.cell.now / 1e9:.3f} s: {service.lateness()}.")
+    for line in () if service.driven is None else service.driven.ended():
+        print(f"  {line}")
     dropped = service.dropped()
     if dropped:
         print(f"{dropped} bytes were lost because a client did not read them.")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -24,6 +25,7 @@ from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.endpoints.endpoint import Endpoint, EndpointError, descriptors_suffice
 from detent.realtime.endpoints.opened import Openings
+from detent.realtime.endpoints.returning import Returning
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.guarded import Guarded
 from detent.realtime.images import Images
@@ -61,12 +63,14 @@ class Service:
         on_stop: Callable[[str], None] = lambda why: None,
         real: RealPins | None = None,
         timers: Sequence[Timer] = (),
+        on_wire: Callable[[str], None] | None = None,
     ) -> None:
         """Build the cell and open `endpoints` for every line; nothing: what the cell file says, or the usual one.
 
         `images` stay their owner's. One that is `observed` can be looked at and meddled with (`realtime.control`).
         `on_stop` is told when the cell cannot go on; it is served all the same. With `real` it drives the boards of its
-        cell file. `timers` are called by the loop. Raises Problem, EndpointError, ValueError.
+        cell file. `timers` are called by the loop. With `on_wire` serial ports may go and come back, and it is told;
+        without, one that is lost ends the service. Raises Problem, EndpointError, ValueError.
         """
         self.description = description
         self.driven: Driven | None = None
@@ -94,9 +98,9 @@ class Service:
                 _watch(self.cell, passes_on=real is not None)
             if opened is not None and stores is not None:
                 self.driven = opened.drive(self.cell, stores)
-                opening.callback(self.driven.close)
+                opening.callback(opened.end, self.driven)
             self._to_begin = opened
-            self._opened = open_endpoints(description, self.cell, endpoints, opening)
+            self._opened = open_endpoints(description, self.cell, endpoints, opening, on_wire=on_wire)
             self.endpoints = [
                 Served(self._title(number), endpoint.kind, endpoint.address, self.cell.lines[number].format)
                 for number, endpoint in self._opened
@@ -236,11 +240,13 @@ def open_endpoints(
     *,
     placed: Mapping[str, Sequence[EndpointSpec]] | None = None,
     link: Callable[[str], Path] | None = None,
+    on_wire: Callable[[str], None] | None = None,
 ) -> list[tuple[int, Endpoint]]:
     """Open `endpoints` for every line, with the line's number; nothing: what the cell file says, or the usual one.
 
     `placed` says it for lines by name instead: those of a service before this one. A pty that nobody has given a place
-    gets the `link` for its line, if that can be had. `opening` closes them. Raises Problem, EndpointError, ValueError.
+    gets the `link` for its line, if that can be had. With `on_wire` serial ports may go and come back, and it is told.
+    `opening` closes them. Raises Problem, EndpointError, ValueError.
     """
     names = cell.wiring.line_names
     if not names:
@@ -255,7 +261,7 @@ def open_endpoints(
             line = cell.lines[number]
             units = [description.units[cell.wiring.names[unit]].model for unit, _ in cell.wiring.lines[number]]
             echoes = any(model.echoes for name, model in catalogue.MODELS.items() if name in units)
-            endpoint = None
+            endpoint: Endpoint | None = None
             if one == EndpointSpec("pty") and link is not None:
                 with contextlib.suppress(EndpointError, OSError):  # another has it: then without
                     there = link(name)
@@ -264,7 +270,8 @@ def open_endpoints(
                         name, line.format, line.parting, echoes=echoes, openings=openings
                     )
             if endpoint is None:
-                endpoint = one.open(name, line.format, line.parting, echoes=echoes, openings=openings)
+                again = partial(one.open, name, line.format, line.parting, echoes=echoes, openings=openings)
+                endpoint = again() if on_wire is None or one.kind != "serial" else Returning(again, on_wire)
             opening.callback(endpoint.close)
             opened.append((number, endpoint))
     return opened

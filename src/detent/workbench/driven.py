@@ -63,7 +63,7 @@ class DrivenEngine(Engine):
         self._stores = Stores()
         cell = self._alike(found, line_timing)
         self._driven = opened.drive(real, stores)
-        self._opening.callback(self._driven.close)
+        self._opening.callback(opened.end, self._driven)
         self._stale: Ns | None = None  # the machine was taken back to before what the second cell has lived through
         self._taken: deque[Ns] = deque()  # when each action was done, of those that both cells have
         self._count = 0  # of those that the machine's cell has, ever
@@ -177,6 +177,10 @@ class DrivenEngine(Engine):
         why = "; ".join(dict.fromkeys(f"{'.'.join(filter(None, (a.unit, a.axis)))}: {a.why}" for a in at_fault))
         standing = Standing.FAULT if at_fault else Standing.DRIVEN
         return RealState(standing.value, why, sum(axis.slips for axis in axes), sum(axis.stops for axis in axes))
+
+    def _on_wire(self) -> Callable[[str], None]:
+        """A machine goes on while its host is away."""
+        return lambda text: self._news(News(self._driven.now, Weight.WARNING, text))
 
     def _news(self, news: News) -> None:
         kind = "action" if news.weight is Weight.NOTE else "error"

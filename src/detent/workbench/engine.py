@@ -106,6 +106,7 @@ class Engine:
                 opening,
                 placed=order.placed,
                 link=self._link if order.state_dir is not None else None,
+                on_wire=self._on_wire(),
             )
             self._pipe = Pipe(end, self._heed, self._tick, lambda: self._loop.stop())
             opening.callback(self._pipe.close)
@@ -178,6 +179,10 @@ class Engine:
 
     def _real_state(self) -> RealState | None:
         """How real pins stand."""
+        return None
+
+    def _on_wire(self) -> Callable[[str], None] | None:
+        """Who is told that a serial port went away and came back; nobody: the cell ends with it."""
         return None
 
     def _picture(self) -> Picture:

@@ -408,9 +408,13 @@ def test_a_count_that_differs_is_a_fault() -> None:
         assert bench.driven.axes()[0].standing is Standing.DRIVEN
 
 
-def test_a_host_that_dies_leaves_a_motor_that_stands_and_outputs_at_rest() -> None:
-    with Bench(CELL) as bench:
+@pytest.mark.parametrize("enable", ['enable = "!gpio4"', ""])
+def test_a_host_that_dies_leaves_a_motor_that_stands_and_outputs_at_rest(enable: str) -> None:
+    """Without a driver to let go, too: a relay that UO1 holds is not held for ever."""
+    with Bench(CELL.replace('enable = "!gpio4"', enable)) as bench:
         bench.run(100 * MS)
+        bench.type("x", "A1")
+        bench.run(20 * MS)
         bench.type("x", "S50")
         bench.run(20 * MS)
         bench.type("x", "+4000")
@@ -420,8 +424,21 @@ def test_a_host_that_dies_leaves_a_motor_that_stands_and_outputs_at_rest() -> No
         port = bench.ports["b"]
         port.run_to(bench.wall)
         assert bench.position("x") <= before + 1000 * (LEAD + 5 * MS) // SECOND + 1
-        assert levels(bench, "gpio4")[-1][1] is True, "the watchdog has let the driver go"
+        assert not enable or levels(bench, "gpio4")[-1][1] is True, "the watchdog has let the driver go"
+        assert [levels(bench, pin)[-1][1] for pin in ("gpio6", "gpio7", "gpio8")] == [False, False, False]
         assert port.board.reason is not None
+
+
+def test_a_plain_driver_is_not_left_with_all_its_current_when_the_host_dies() -> None:
+    text = CELL.replace('enable = "!gpio4"', 'driver = { kind = "plain", half = "gpio9" }')
+    with Bench(text) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+4000")
+        bench.run(300 * MS)
+        assert levels(bench, "gpio9")[-1][1] is False
+        bench.stall(5 * SECOND)
+        bench.ports["b"].run_to(bench.wall)
+        assert levels(bench, "gpio9")[-1][1] is True
 
 
 @pytest.mark.parametrize("power", [False, True])

@@ -9,6 +9,7 @@ from tests.realtime.served import no_file
 from detent.cell.description import Problem, parse
 from detent.realtime.boards.drive import RealPins
 from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.states import News
 from detent.realtime.control import Control
@@ -104,6 +105,66 @@ def test_without_real_pins_there_is_nothing_to_stop() -> None:
         pytest.raises(AskedWrongly, match="no real pins are driven; serve the cell with --real"),
     ):
         Control(service).do("stop", {})
+
+
+@pytest.mark.parametrize(("typed", "span"), [("", 0), ("+3000", 2), ("+3000", 300), ("-3000", 700), ("+40", 900)])
+def test_an_orderly_end_leaves_every_output_at_rest_and_says_where_the_motor_stands(typed: str, span: int) -> None:
+    """As the watchdog does when the host dies: a relay on UO1 must not stay on because somebody ended the service."""
+    machine = Machine(axes={"x": MachineAxis("gpio2", "gpio3")})
+    port = FakePort(FakeBoard(machine, moves=400))
+    service, wall, _ = made(CELL, port)
+    with service:
+        control = Control(service)
+        run(service, wall, 100 * MS)
+        control.do("type", {"text": "A1"})
+        run(service, wall, 100 * MS)
+        assert machine.outputs["gpio8"] is True
+        control.do("type", {"text": typed or "V"})
+        run(service, wall, span * MS)
+        moving = service.driven is not None and service.driven.axes()[0].moving
+    assert service.driven is not None
+    port.run_to(wall.now + SECOND)
+    rest = {"gpio6": False, "gpio7": False, "gpio8": False, "gpio4": True}  # MOV, RDY (active low), UO1, enable (low)
+    assert {pin: machine.outputs[pin] for pin in rest} == rest
+    let_go = max(tick for tick, pin, level in machine.edges if pin == "gpio4" and level)
+    assert all(tick <= let_go for tick, _, _ in machine.steps), "the motor is held until its last step"
+    [line] = service.driven.ended()
+    cut = "; it was stopped in mid-move, without a ramp" if moving else ""
+    assert line == f"x stands at {machine.axes['x'].position}{cut}"
+    assert moving is (0 < span < 900)
+
+
+def test_an_end_on_a_switch_and_an_end_at_fault_say_so() -> None:
+    machine = Machine(
+        axes={"x": MachineAxis("gpio2", "gpio3")}, switches=[MachineSwitch("x", "gpio12", 150, 900, False)]
+    )
+    port = FakePort(FakeBoard(machine, moves=400))
+    service, wall, _ = made(CELL, port)
+    with service:
+        control = Control(service)
+        run(service, wall, 100 * MS)
+        control.do("type", {"text": "+3000"})
+        while machine.axes["x"].position < 150:
+            run(service, wall, 1 * MS)
+    assert service.driven is not None
+    assert service.driven.ended()[0].startswith(f"x stands at {machine.axes['x'].position}")
+    service, wall, _ = made(CELL)
+    with service:
+        run(service, wall, 100 * MS)
+        Control(service).do("stop", {})
+    assert service.driven is not None
+    assert service.driven.ended() == ["x stands: emergency stop"]
+
+
+def test_a_board_that_is_gone_delays_no_end() -> None:
+    deaf = False
+    port = FakePort(FakeBoard(moves=400), spoil=lambda data, to_board: [] if deaf else [data])
+    service, wall, _ = made(CELL, port)
+    with service:
+        run(service, wall, 100 * MS)
+        deaf = True
+        before = wall.now
+    assert wall.now - before < 3 * SECOND
 
 
 def test_positions_are_waited_for_across_a_stop_that_takes_the_cell_back() -> None:

@@ -88,6 +88,11 @@ class Board:
         return self._equipment.inputs.levels
 
     @property
+    def still(self) -> bool:
+        """Whether nothing is said to it at present."""
+        return self.state in _STILL
+
+    @property
     def firmware(self) -> str:
         """Its version as it says; empty until it is known."""
         return self.core.dictionary.version
@@ -171,7 +176,7 @@ class Board:
         core.link.due(wall)
         if self.state is State.CONNECTING and wall >= self._begin_at + NO_ANSWER:
             self._refuse("", "", "it does not answer as a board with Klipper firmware; look at its address and its "
-                         "cable, and that the firmware is flashed for this interface")  # fmt: skip
+                         "cable, and that the firmware is flashed for this interface", passing=True)  # fmt: skip
             return
         silent = core.due(wall)
         if silent is not None:
@@ -309,7 +314,8 @@ class Board:
         elif "config_reset" in core.dictionary.commands:
             core.command("config_reset" if is_shutdown else "emergency_stop")  # see `_shutdown`
         else:
-            self._refuse("", "", "it has another configuration and cannot be reset by command; switch it off and on")
+            what = "it has another configuration and cannot be reset by command; switch it off and on"
+            self._refuse("", "", what, passing=True)
             return
         self.wants_reopening = True
 
@@ -403,11 +409,11 @@ class Board:
         self.reason = reason
         self.core.events.append(Lost(self.name, reason))
 
-    def _refuse(self, item: str, key: str, text: str) -> None:
+    def _refuse(self, item: str, key: str, text: str, *, passing: bool = False) -> None:
         self.state = State.REFUSED
         self.reason = text
         self.core.forget_questions()
-        self.core.events.append(Refusal(self.name, item, key, text))
+        self.core.events.append(Refusal(self.name, item, key, text, passing))
 
     def _fall(self, state: State) -> None:
         self.state = state

@@ -13,7 +13,7 @@ from detent.outputs.steps import Error, Runs, Scale
 from detent.pins import Level
 from detent.pulses import Train, Uniform
 from detent.realtime.boards.driven import Driven
-from detent.realtime.boards.opening import Sleep, boards_of, make_ready, set_drivers
+from detent.realtime.boards.opening import Sleep, boards_of, make_ready, set_drivers, turn
 from detent.realtime.boards.plan import Plan, plan
 from detent.realtime.boards.port import Port
 from detent.realtime.boards.ports import open_port
@@ -23,8 +23,10 @@ from detent.realtime.boards.stages import stages
 from detent.realtime.boards.states import News
 from detent.realtime.boards.stepper import LONGEST
 from detent.realtime.pace import Pace, WallNs
-from detent.ticks import Ns
+from detent.ticks import MS, SECOND, Ns
 
+ENDING: WallNs = SECOND  # for the last steps to leave, and for boards to hear of the end; each
+PAUSE: WallNs = 5 * MS
 PRIORITY = 20  # of the real-time class: above most, below what the system keeps for itself
 
 
@@ -87,6 +89,24 @@ class Opened:
         """The cell's present is now; from here on pulses leave."""
         driven.on_moving = _no_collection_while
         driven.begin(pace, self._levels)
+
+    def end(self, driven: Driven) -> None:
+        """Let go of everything: motors stand first, then drivers and outputs fall, and each board has heard of it.
+
+        A board that does not answer any more does so by itself, when its watchdog runs out.
+        """
+        driven.halt()
+        self._until(driven.let_out)
+        driven.close()
+        self._until(lambda: self.boards.quiet)
+        self.boards.close()
+
+    def _until(self, done: Callable[[], bool]) -> None:
+        begun = self._real.wall()
+        for _ in range(ENDING // PAUSE):
+            if done() or self._real.wall() - begun > ENDING:
+                return
+            turn(self.boards, self._real.wall, self._real.sleep, PAUSE)
 
 
 def _warm_up(error: Error) -> None:

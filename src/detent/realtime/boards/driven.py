@@ -8,6 +8,7 @@ certain.
 
 from collections.abc import Sequence
 
+from detent.realtime.boards.events import Stopped
 from detent.realtime.boards.mishaps import Mishaps
 from detent.realtime.boards.states import AxisState, BoardState, Standing
 from detent.ticks import MS, NEVER, Ns
@@ -149,15 +150,46 @@ class Driven(Mishaps):
             next(counts)
         self._stores.forget(next(counts))
 
+    def halt(self) -> None:
+        """Whatever moves ends with the steps that have left. Nothing is lived through any more: `close` follows."""
+        moving = [axle for axle in self.axles if axle.motion is not None and axle.standing is Standing.DRIVEN]
+        self.cut_short = frozenset(axle.name for axle in moving)
+        for unit in dict.fromkeys(axle.what.unit for axle in moving):
+            self.cell.halt(unit)
+        self._absorb()
+        self.commit()
+
+    def let_out(self) -> bool:
+        """Behind `halt`, from time to time: whether the last step has left, and no switch that it met is untold."""
+        wall = self._wall()
+        for event in self.boards.events():
+            if isinstance(event, Stopped):  # one of the last steps met a switch
+                self._by_stepper[event.stepper].stepper.rewind(event.shaft)
+        self.boards.commit(self.cell.now, wall, self._wall)
+        if not all(axle.stepper.over(wall) for axle in self.axles):
+            return False
+        self._over = wall if self._over is None else self._over
+        self.boards.inquire(wall)
+        heard = self.boards.heard()
+        return heard is None or heard > self._over
+
     def close(self) -> None:
-        """Let go: what is certain is stored, drivers are switched off, and no step comes any more."""
+        """Let go: what is certain is stored, no step comes any more, and every output falls to its level at rest."""
         self._stores.flush(NEVER)
-        for axle in self.axles:
-            if axle.what.enable:
-                self.boards.outs[axle.what.enable].now(False)
-        self.boards.commit(self.cell.now, self._wall(), self._wall)
-        self.boards.close()
+        self.boards.emergency_stop(self._wall())
         self.on_moving(False)
+
+    def ended(self) -> list[str]:
+        """Where each axis stands, behind `close`: a line each for people."""
+        told = []
+        for axle in self.axles:
+            if axle.standing is not Standing.DRIVEN:
+                told.append(f"{axle.name} stands: {axle.why or 'it was not driven yet'}")
+            else:
+                where = f"{axle.name} stands at {axle.stepper.shaft}" + ("" if axle.known else " (not known for sure)")
+                cut = "; it was stopped in mid-move, without a ramp" if axle.name in self.cut_short else ""
+                told.append(where + cut)
+        return told
 
     def axes(self) -> list[AxisState]:
         """How every driven axis stands."""

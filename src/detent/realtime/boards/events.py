@@ -110,12 +110,16 @@ class DriverSet(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """The board cannot be used so: `item`, `key` of the setup at fault (empty: the board), why and what to do."""
+    """The board cannot be used so: `item`, `key` of the setup at fault (empty: the board), why and what to do.
+
+    One that is `passing` may be over without another file or firmware: whoever waits asks again.
+    """
 
     board: str
     item: str
     key: str
     text: str
+    passing: bool = False
 
 
 Event: TypeAlias = (

@@ -99,6 +99,8 @@ class Leaving:
         self.on_taken_back: Callable[[Ns], None] = lambda at: None  # what the cell did behind `at` did not happen
         self._was_moving = False
         self.abandoned = False  # the cell cannot go on, and so nothing is done for it any more
+        self.cut_short: frozenset[str] = frozenset()  # axes that moved when the end came
+        self._over: WallNs | None = None  # since when their last steps have left
         self.escaped = 0  # characters that hosts heard though they were taken back
         self.rewinds = 0
         self.longest_rewind: WallNs = 0

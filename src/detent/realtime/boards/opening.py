@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from detent.cell.description import Problem
 from detent.controllers.device import Stage
 from detent.pins import Level
-from detent.realtime.boards.events import DriverFault, DriverSet, Ready, Refusal
+from detent.realtime.boards.events import DriverFault, DriverSet, Lost, Ready, Refusal
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.port import Port
 from detent.realtime.boards.setup import SetupProblem
@@ -21,6 +21,10 @@ Sleep = Callable[[Sequence[int], Sequence[int], float], tuple[Sequence[int], Seq
 """Wait until a descriptor can be read or written, or some seconds have passed: those that can."""
 
 
+class NotYet(Problem):
+    """What may be over without another cell file: a board that is not there, a chip that has no supply yet."""
+
+
 def boards_of(plan: Plan, open_port: Callable[[str], Port]) -> Boards:
     """The boards of a plan with their ports open; nothing is said yet. Raises Problem."""
     opened: list[Port] = []
@@ -29,7 +33,7 @@ def boards_of(plan: Plan, open_port: Callable[[str], Port]) -> Boards:
             try:
                 opened.append(open_port(address))
             except OSError as error:
-                raise Problem(plan.file, f"boards.{setup.name}.serial", str(error)) from None
+                raise NotYet(plan.file, f"boards.{setup.name}.serial", str(error)) from None
         try:
             return Boards([(setup, port) for (setup, _), port in zip(plan.setups, opened, strict=True)])
         except SetupProblem as problem:
@@ -55,11 +59,14 @@ def make_ready(
         if now - began > PATIENCE:
             late = next(name for name, board in boards.boards.items() if board.state.value != "ready")
             what = f"the board does not answer as one with Klipper firmware would, for {PATIENCE // SECOND} s"
-            raise Problem(plan.file, f"boards.{late}.serial", f"{what}: look with detent boards")
+            raise NotYet(plan.file, f"boards.{late}.serial", f"{what}: look with detent boards")
         turn(boards, wall, sleep)
         for event in boards.events():
             if isinstance(event, Refusal):
-                raise plan.problem(SetupProblem(event.item or event.board, event.key, event.text))
+                problem = plan.problem(SetupProblem(event.item or event.board, event.key, event.text))
+                raise _not_yet(problem) if event.passing else problem
+            if isinstance(event, Lost):
+                raise NotYet(plan.file, f"boards.{event.board}.serial", f"{event.reason}; look at its cable")
             if isinstance(event, Ready):
                 levels |= {name: int(level) for name, level in event.inputs.items()}
     return levels
@@ -86,12 +93,17 @@ def set_drivers(
         turn(boards, wall, sleep)
         for event in boards.events():
             if isinstance(event, DriverFault):
-                raise plan.problem(SetupProblem(event.driver, "", event.reason))
+                raise _not_yet(plan.problem(SetupProblem(event.driver, "", event.reason)))
             if isinstance(event, DriverSet):
                 waiting.discard(event.driver)
         if waiting and wall() - began > PATIENCE:
-            raise plan.problem(SetupProblem(min(waiting), "", "the driver is not set after ten seconds; look at its "
-                                            "supply and its wires"))  # fmt: skip
+            late = SetupProblem(min(waiting), "", "the driver is not set after ten seconds; look at its supply and "
+                                "its wires")  # fmt: skip
+            raise _not_yet(plan.problem(late))
+
+
+def _not_yet(problem: Problem) -> NotYet:
+    return NotYet(problem.file, problem.key, problem.message)
 
 
 def turn(boards: Boards, wall: Callable[[], WallNs], sleep: Sleep | None, most: Ns = 20 * MS) -> None:

@@ -82,7 +82,7 @@ def plan(described: Description, controllers: Mapping[str, Controller], least_le
             found = next(p for p in controller.pins if p.name == pin)
             rest = found.rest == HIGH or found.kind is PinKind.OPEN_COLLECTOR
             outs[unit, pin] = name = f"{unit}.{pin}"
-            here.outs.append(OutSetup(name, Pin.parse(text), rest, rest))
+            here.outs.append(OutSetup(name, Pin.parse(text), rest, rest, described.boards[table.board].watchdog))
             keys[name] = f"{where}.outputs.{pin}"
         for pin, text in table.inputs.items():
             name = f"{unit}.{pin}"
@@ -141,7 +141,8 @@ def _axis(
     if driver is not None and driver.kind == "plain":
         assert driver.half is not None
         axis = axis._replace(half=f"{key}.half")
-        here.outs.append(OutSetup(axis.half, Pin.parse(driver.half), initial=True, off=True))
+        half = OutSetup(axis.half, Pin.parse(driver.half), initial=True, off=True, watchdog=board.watchdog)
+        here.outs.append(half)
         keys[axis.half] = f"{where}.driver.half"
     elif driver is not None and driver.kind != "plain":
         axis = axis._replace(driver=f"{key}.driver")

@@ -276,6 +276,11 @@ class Boards:
                 board.recover(wall)
             self._pump(board, port, wall)
 
+    @property
+    def quiet(self) -> bool:
+        """Whether every board that is there has acknowledged what it was sent."""
+        return all(board.core.link.idle for board, _ in self._pairs if not board.still)
+
     def close(self) -> None:
         """Let go of the ports. Outputs stay as they are; those with a watchdog fall to `off` when it runs out."""
         for _, port in self._pairs:
