@@ -27,6 +27,7 @@ from detent.realtime.endpoints.endpoint import Endpoint, EndpointError, descript
 from detent.realtime.endpoints.opened import Openings
 from detent.realtime.endpoints.returning import Returning
 from detent.realtime.endpoints.spec import EndpointSpec
+from detent.realtime.endpoints.unsettling import Unsettling
 from detent.realtime.guarded import Guarded
 from detent.realtime.images import Images
 from detent.realtime.loop import BEHIND, Loop, Timer, stopped_by_signals, wake_exactly
@@ -253,7 +254,7 @@ def open_endpoints(
         raise Problem(description.file, "units", "there is no unit with a serial line to serve")
     outside = [number for number, line in enumerate(cell.lines) if not line.hosted]
     opened: list[tuple[int, Endpoint]] = []
-    openings = Openings()
+    openings, unsettling = Openings(), Unsettling()
     for place, number in enumerate(outside):
         name = names[number]
         found = placed.get(name) if placed else None
@@ -267,10 +268,12 @@ def open_endpoints(
                     there = link(name)
                     there.parent.mkdir(parents=True, exist_ok=True)
                     endpoint = EndpointSpec("pty", str(there)).open(
-                        name, line.format, line.parting, echoes=echoes, openings=openings
+                        name, line.format, line.parting, echoes=echoes, openings=openings, unsettling=unsettling
                     )
             if endpoint is None:
-                again = partial(one.open, name, line.format, line.parting, echoes=echoes, openings=openings)
+                again = partial(
+                    one.open, name, line.format, line.parting, echoes=echoes, openings=openings, unsettling=unsettling
+                )
                 endpoint = again() if on_wire is None or one.kind != "serial" else Returning(again, on_wire)
             opening.callback(endpoint.close)
             opened.append((number, endpoint))

@@ -1,5 +1,7 @@
 import os
 import select
+import socket
+import subprocess
 import sys
 import termios
 import tty
@@ -12,8 +14,10 @@ import pytest
 import serial
 from tests.realtime.ticking import TickingCell, look
 
+from detent.realtime.endpoints import unsettler
 from detent.realtime.endpoints.endpoint import MOST_WAITING, EndpointError
 from detent.realtime.endpoints.pty import PseudoTerminal
+from detent.realtime.endpoints.unsettling import Unsettling
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace
 
@@ -191,6 +195,42 @@ def test_what_was_changed_in_between_is_seen_even_within_one_setting() -> None:
             settle(loop)
             before, after = termios.tcgetattr(client.fileno())[5], before
             assert before != after
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux refuses formats on a pseudo-terminal")
+def test_a_setting_is_unsettled_while_the_loop_has_other_work() -> None:
+    """No loop is as quick as a program that sets its port twice: a process beside it is."""
+    unsettling = Unsettling()
+    terminals = [PseudoTerminal(unsettling=unsettling) for _ in range(2)]
+    try:
+        for _ in range(3):
+            for terminal in terminals:
+                with serial.Serial(terminal.address, timeout=0, **SETTINGS[0]) as client:
+                    for number in range(3):
+                        unusual(client.fileno())
+                        client.timeout = number
+                    unusual(client.fileno())
+    finally:
+        for terminal in terminals:
+            terminal.close()
+    with pytest.raises(OSError, match="No such file"):
+        os.stat(terminals[0].address)  # nobody keeps it open
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux refuses formats on a pseudo-terminal")
+def test_the_process_beside_the_loop_ends_with_it() -> None:
+    """However it ends: the process has no other line to hang on."""
+    ours, theirs = socket.socketpair()
+    with theirs:
+        process = subprocess.Popen([sys.executable, "-I", "-S", unsettler.__file__], stdin=theirs)
+    ours.close()
+    assert process.wait(60) == 0
+
+
+def unusual(descriptor: int) -> None:
+    """Wait until the speed is one that nobody uses."""
+    while termios.tcgetattr(descriptor)[5] not in unsettler.UNUSUAL:
+        os.sched_yield()
 
 
 def settle(loop: Loop) -> None:

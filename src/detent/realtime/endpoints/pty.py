@@ -1,16 +1,9 @@
-"""A pseudo-terminal: what a program that expects a serial port opens.
-
-Linux keeps 8 data bits and no parity on a pseudo-terminal, whatever a client asks for. The C library makes an error of
-that (EINVAL) if nothing else that was asked for made a difference: a port would open in 7O2 once, and never again. So
-something always is to make a difference: when a client has set something, the speed, which means nothing here, is set
-to one that nobody uses. The kernel tells of settings in packet mode, with EXTPROC set; nothing else comes of both.
-"""
+"""A pseudo-terminal: what a program that expects a serial port opens."""
 
 import fcntl
 import os
 import stat
 import struct
-import sys
 import termios
 import tty
 from collections.abc import Sequence
@@ -19,13 +12,10 @@ from pathlib import Path
 
 from detent.realtime.endpoints.endpoint import MOST_READ, EndpointError, Outgoing
 from detent.realtime.endpoints.opened import Opened, Openings
+from detent.realtime.endpoints.unsettler import TELLS, UNUSUAL, unsettle
+from detent.realtime.endpoints.unsettling import Unsettling
 from detent.realtime.pace import WallNs
 from detent.uart import Chars
-
-UNUSUAL = (termios.B134, termios.B150)  # two, for a client that looks before and after it has set something
-_EXTPROC = 0o200000  # of the local flags, on Linux
-_TELLS = sys.platform.startswith("linux")
-_LFLAG, _ISPEED, _OSPEED = 3, 4, 5  # in what `tcgetattr` gives
 
 
 class PseudoTerminal:
@@ -38,10 +28,17 @@ class PseudoTerminal:
 
     kind = "pty"
 
-    def __init__(self, link: Path | None = None, parting: Chars = b"", openings: Openings | None = None) -> None:
+    def __init__(
+        self,
+        link: Path | None = None,
+        parting: Chars = b"",
+        openings: Openings | None = None,
+        unsettling: Unsettling | None = None,
+    ) -> None:
         """`parting` is what the line hears when the last client leaves, if it said something.
 
-        Several in one loop may share `openings`, by which they are told who comes and goes.
+        Several in one loop may share `openings`, by which they are told who comes and goes, and `unsettling`, which is
+        closed with the first of them: then they are served no longer.
         Raises EndpointError if `link` cannot be made, is something else than a link, or is served by another.
         """
         try:
@@ -54,14 +51,17 @@ class PseudoTerminal:
         self._link: Path | None = None
         self._clients: Opened | None = None
         self._unusual = UNUSUAL[-1]
+        self._unsettling = unsettling
         try:
             tty.setraw(self._theirs)
             os.set_blocking(self._ours, False)
             self._device = os.ttyname(self._theirs)
             _lock(self._theirs)
-            if _TELLS:
+            if TELLS:
                 fcntl.ioctl(self._ours, termios.TIOCPKT, struct.pack("i", 1))
                 self._unsettle()
+                if unsettling is not None:
+                    unsettling.watch(self._ours)
             self._clients = Opened(self._device, openings)
             if link is not None:
                 _point(link, self._device)
@@ -100,10 +100,10 @@ class PseudoTerminal:
             owed, self._owed = self._owed, b""
             return owed
         try:
-            read = os.read(self._ours, MOST_READ + 1 if _TELLS else MOST_READ)
+            read = os.read(self._ours, MOST_READ + 1 if TELLS else MOST_READ)
         except BlockingIOError:
             return b""
-        if not _TELLS:
+        if not TELLS:
             return read
         self._said |= len(read) > 1
         if read[:1] != b"\0":  # not data
@@ -112,7 +112,7 @@ class PseudoTerminal:
         return read[1:]
 
     def _unsettle(self) -> None:
-        self._unusual = _unsettle(self._theirs, self._unusual)
+        self._unusual = unsettle(self._theirs, self._unusual)
 
     def send(self, data: bytes, wall: WallNs) -> None:
         """Give `data` to the client, now or when it reads."""
@@ -140,6 +140,8 @@ class PseudoTerminal:
 
     def close(self) -> None:
         """Close the terminal; remove the link if it still is ours."""
+        if self._unsettling is not None:
+            self._unsettling.close()  # which has it open
         if self._clients is not None:
             self._clients.close()
         if self._link is not None:
@@ -153,17 +155,6 @@ class PseudoTerminal:
             if descriptor >= 0:
                 os.close(descriptor)
         self._ours = self._theirs = -1
-
-
-def _unsettle(descriptor: int, last: int) -> int:
-    """Whatever a client sets next makes a difference, and is told. The speed for that: another than the `last` one."""
-    settings = termios.tcgetattr(descriptor)
-    if settings[_OSPEED] not in UNUSUAL or not settings[_LFLAG] & _EXTPROC:
-        last = next(speed for speed in UNUSUAL if speed != last)
-        settings[_ISPEED] = settings[_OSPEED] = last
-        settings[_LFLAG] |= _EXTPROC
-        termios.tcsetattr(descriptor, termios.TCSANOW, settings)
-    return last
 
 
 _SET_LOCK = getattr(fcntl, "F_OFD_SETLK", None)  # of an open file, so that no other opening or closing releases it

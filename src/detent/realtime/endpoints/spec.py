@@ -9,6 +9,7 @@ from detent.realtime.endpoints.opened import Openings
 from detent.realtime.endpoints.rfc2217 import Rfc2217Port
 from detent.realtime.endpoints.serialport import SerialPort
 from detent.realtime.endpoints.tcp import TcpAddress, TcpPort
+from detent.realtime.endpoints.unsettling import Unsettling
 from detent.realtime.system import termios
 from detent.uart import Chars, Format
 
@@ -64,12 +65,19 @@ class EndpointSpec(NamedTuple):
         return self
 
     def open(
-        self, name: str, form: Format, parting: Chars = b"", *, echoes: bool = False, openings: Openings | None = None
+        self,
+        name: str,
+        form: Format,
+        parting: Chars = b"",
+        *,
+        echoes: bool = False,
+        openings: Openings | None = None,
+        unsettling: Unsettling | None = None,
     ) -> Endpoint:
         """The endpoint, for the line `name` with characters of `form`. Raises EndpointError.
 
         `parting` is what the line hears when a client leaves, as far as that is seen. One that `echoes` sends back what
-        is typed. Those of one loop may share `openings`.
+        is typed. Those of one loop may share `openings` and `unsettling`.
         """
         match self.kind:
             case "pty":
@@ -77,7 +85,7 @@ class EndpointSpec(NamedTuple):
                     raise EndpointError("this system has no pseudo-terminals; take --tcp or --rfc2217 HOST:PORT")
                 from detent.realtime.endpoints.pty import PseudoTerminal
 
-                return PseudoTerminal(Path(self.where) if self.where else None, parting, openings)
+                return PseudoTerminal(Path(self.where) if self.where else None, parting, openings, unsettling)
             case "tcp":
                 return TcpPort(TcpAddress.parse(self.where), name, parting)
             case "rfc2217":
