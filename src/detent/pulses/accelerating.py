@@ -49,8 +49,8 @@ class Accelerating(Immutable):
             raise ValueError(f"a ramp has 0 <= low <= high, not {self.low} and {self.high}")
         slow, gain = self.slow, self.gain
         made = _constants(slow.numerator, slow.denominator, gain.numerator, gain.denominator)
-        for name, value in zip(_DERIVED, made, strict=True):
-            object.__setattr__(self, name, value)
+        for put, value in zip(_PUT_DERIVED, made, strict=True):
+            put(self, value)
 
     @classmethod
     def down_from(cls, begin: Fixed, slow: Fraction | int, gain: Fraction | int, steps: int) -> "Accelerating":
@@ -147,10 +147,11 @@ class Accelerating(Immutable):
 
     def moved(self, by: Fixed) -> "Accelerating":
         """The same segment, `by` later."""
-        return replace(self, anchor=self.anchor + by)
+        return Accelerating(self.anchor + by, self.slow, self.gain, self.low, self.high, self.up)
 
 
 _DERIVED = ("root_gain", "slow_root", "divisor", "gain_ns", "slow_ns", "square_ns")
+_PUT_DERIVED = tuple(vars(Accelerating)[name].__set__ for name in _DERIVED)
 
 
 @lru_cache(maxsize=256)

@@ -1,7 +1,7 @@
-"""The inner loop of long ramps, compiled by numba. Imported only when it is wanted: that takes a second.
+"""The inner loops of long ramps, compiled by numba. Imported only when they are wanted: that takes a second.
 
 The integers are those of the NumPy path, since both ask the exact law where float64 cannot tell. The loops
-are written so that the compiler makes vector code of them: one form each, over a slice, without a branch.
+are written so that the compiler makes vector code of them: one form each, over a row, without a branch.
 """
 
 from collections.abc import Callable
@@ -9,68 +9,100 @@ from collections.abc import Callable
 import numba as nb
 import numpy as np
 
+from detent.pulses.accelerating import TINY
+from detent.pulses.ramp_estimates import FROM_MIDDLE, SERIES, Chunk
 from detent.pulses.segment import Int64Array
+from detent.pulses.settling import Scale, shift_of
 from detent.ticks import Ns
 
-_BLOCK = 1024  # pulses between two looks at how close the estimates came
+_WAYS = {"rooted": 0, "divided": 1, "rows": 2}
+
+_compiled = nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
 
 
-@nb.njit(cache=True, error_model="numpy")
-def _rooted(out, j, sign, gain, square, shift, threshold, base):  # type: ignore[no-untyped-def]
-    """Write the times of pulses j, j + sign ... steps from the slow end; return how many came too close."""
+@_compiled
+def _rooted(out, bits, j, sign, gain, square, plus, places, shift, mask):  # type: ignore[no-untyped-def]
+    """Write the times of the pulses j, j + sign ... steps from the slow end; return how many came too close."""
     near = 0
     for i in range(len(out)):
-        y = sign * np.sqrt(gain * (j + sign * i) + square) + shift
-        whole = np.floor(y)
-        near += 1 if y - whole < threshold else 0
-        out[i] = base + np.int64(whole)
+        b = np.float64(plus + sign * np.sqrt(gain * (j + sign * i) + square)).view(np.int64)
+        bits[i] = b
+        out[i] = shift + (b >> places)
+        near += 1 if b & mask == 0 else 0
     return near
 
 
-@nb.njit(cache=True, error_model="numpy")
-def _divided(out, j, sign, gain, square, root, lead, threshold, base):  # type: ignore[no-untyped-def]
+@_compiled
+def _divided(out, bits, j, sign, gain, square, root, plus, places, shift, mask):  # type: ignore[no-untyped-def]
     """The same by the form that stays exact far from standstill."""
     near = 0
     for i in range(len(out)):
-        step = gain * (j + sign * i)
-        y = sign * (step / (np.sqrt(step + square) + root)) + lead
-        whole = np.floor(y)
-        near += 1 if y - whole < threshold else 0
-        out[i] = base + np.int64(whole)
+        growth = gain * (j + sign * i)
+        b = np.float64(plus + sign * (growth / (np.sqrt(growth + square) + root))).view(np.int64)
+        bits[i] = b
+        out[i] = shift + (b >> places)
+        near += 1 if b & mask == 0 else 0
     return near
 
 
-@nb.njit(cache=True, error_model="numpy")
-def _ramp(out, close, sign, gain, square, root, divide, lead, threshold, base):  # type: ignore[no-untyped-def]
+@_compiled
+def _row(out, bits, steps, zeroth, first, second, third, fourth, places, shift, mask):  # type: ignore[no-untyped-def]
+    """The same by a polynomial of the steps from the middle."""
+    near = 0
+    for i in range(len(out)):
+        x = steps[i]
+        b = np.float64(zeroth + x * (first + x * (second + x * (third + x * fourth)))).view(np.int64)
+        bits[i] = b
+        out[i] = shift + (b >> places)
+        near += 1 if b & mask == 0 else 0
+    return near
+
+
+@_compiled
+def _fill(out, close, steps, way, sign, gain, square, root, plus, places, shift, mask):  # type: ignore[no-untyped-def]
     """Write the times; return how many places in `close` hold the index of an estimate that came too close."""
     found = 0
-    for begin in range(0, len(out), _BLOCK):
-        block = out[begin : begin + _BLOCK]
+    bits = np.empty(len(steps), np.int64)
+    for begin in range(0, len(out), len(steps)):
+        row = out[begin : begin + len(steps)]
         # steps from the slow end of the chunk: 1 .. len, or len - 1 .. 0
         j = 1.0 + begin if sign > 0.0 else len(out) - 1.0 - begin
-        if divide:
-            near = _divided(block, j, sign, gain, square, root, lead, threshold, base)
+        if way == 0:
+            near = _rooted(row, bits, j, sign, gain, square, plus - sign * root, places, shift, mask)
+        elif way == 1:
+            near = _divided(row, bits, j, sign, gain, square, root, plus, places, shift, mask)
         else:
-            near = _rooted(block, j, sign, gain, square, lead - sign * root, threshold, base)
+            growth = gain * (j - sign * steps[0])
+            middle = growth + square
+            base = np.sqrt(middle)
+            u = sign * gain / middle  # of a step
+            first, second = sign * base * u, sign * base * u * u
+            near = _row(
+                row, bits, steps, plus + sign * (growth / (base + root)), SERIES[0] * first, SERIES[1] * second,
+                SERIES[2] * first * u * u, SERIES[3] * second * u * u, places, shift, mask,
+            )  # fmt: skip
         if near:
-            for i in range(len(block)):
-                step = gain * (j + sign * i)
-                if divide:
-                    y = sign * (step / (np.sqrt(step + square) + root)) + lead
-                else:
-                    y = sign * np.sqrt(step + square) + (lead - sign * root)
-                # with a margin, should the compiler have arranged this loop differently
-                if y - np.floor(y) < 1.5 * threshold or y - np.floor(y) > 1.0 - threshold:
+            for i in range(len(row)):
+                if bits[i] & mask == 0:
                     close[found] = begin + i
                     found += 1
     return found
 
 
-def ramp(out: Int64Array, up: bool, gain: float, square: float, root: float, divide: bool, lead: float,
-         guard: float, base: Ns, exact: Callable[[int], Ns]) -> None:  # fmt: skip
-    """Write a chunk of a ramp; the meaning of the numbers is in `arrays.fill_ramp`."""
-    close = np.empty(len(out), np.int64)
-    slow = root if root > 0.0 else 1e-300  # 0 / 0 at standstill itself
-    found = _ramp(out, close, 1.0 if up else -1.0, gain, square, slow, divide, lead, 2.0 * guard, base)
+def fill(
+    block: Int64Array,
+    close: Int64Array,
+    way: str,
+    chunk: Chunk,
+    scale: Scale,
+    base: Ns,
+    exact: Callable[[int], Ns],
+    guard: int,
+) -> None:
+    """Write a chunk of a ramp; `close` has room for as many, all else is said in `ramp_arrays` and `settling`."""
+    found = _fill(
+        block, close, FROM_MIDDLE, _WAYS[way], 1.0 if chunk.up else -1.0, chunk.gain, chunk.square,
+        max(chunk.root, TINY), chunk.plus, scale.places, shift_of(base, scale), int(scale.masks[guard]),
+    )  # fmt: skip
     for i in close[:found].tolist():
-        out[i] = exact(i)
+        block[i] = exact(i)

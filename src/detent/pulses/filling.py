@@ -1,6 +1,6 @@
 """The times of pulses that follow each other in one segment, as an array."""
 
-from detent.pulses import arrays, table_arrays, ticked_arrays
+from detent.pulses import arrays, ramp_arrays, table_arrays, ticked_arrays
 from detent.pulses.accelerating import Accelerating
 from detent.pulses.laws import AnySegment
 from detent.pulses.segment import Int64Array
@@ -18,7 +18,7 @@ def fill(out: Int64Array, segment: AnySegment, first: int, start: Fixed) -> None
         anchor = start + segment.anchor
         arrays.fill_progression(out, segment.first + first, segment.numerator, segment.denominator, anchor)
     elif isinstance(segment, Accelerating):
-        arrays.fill_ramp(out, first, segment, start)
+        ramp_arrays.fill_ramp(out, first, segment, start)
     elif isinstance(segment, Table):
         table_arrays.fill(segment, out, first, start)
     else:

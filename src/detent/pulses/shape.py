@@ -4,6 +4,7 @@ from bisect import bisect_left
 from typing import TYPE_CHECKING
 
 from detent.pulses.laws import AnySegment
+from detent.pulses.quick import MOST, Quick, quick
 from detent.pulses.segment import Int64Array
 from detent.pulses.ticked import Ticked
 from detent.ticks import FIXED_BITS, ONE_NS, Fixed
@@ -18,7 +19,7 @@ SHORT = 1 << 10  # pulses a segment, on average, below which columns are quicker
 class Shape:
     """The segments of a train and their running sums. ValueError for segments that overlap or follow an endless one."""
 
-    __slots__ = ("_columns", "_kept", "before", "begins", "ends", "lasts", "segments", "steps", "through")
+    __slots__ = ("_columns", "_kept", "before", "begins", "ends", "lasts", "quick", "segments", "steps", "through")
 
     def __init__(self, segments: tuple[AnySegment, ...]) -> None:
         self.segments = segments
@@ -31,6 +32,7 @@ class Shape:
         self.ends: list[Fixed] = []
         self._kept: tuple[Fixed, Int64Array] | None = None
         self._columns: tuple[Fixed, Columns] | None = None
+        self.quick: list[Quick | None] | None = None  # of each segment, once `make_quick` was called
         pulses, last, end = 0, 0, 0
         for number, segment in enumerate(segments):
             if self.steps is None:
@@ -52,6 +54,14 @@ class Shape:
             self.lasts.append(last)
             self.ends.append(end)
 
+    def make_quick(self) -> "list[Quick | None]":
+        """Make and keep the quick formulas of all segments; none of trains that have very many."""
+        few = len(self.segments) <= MOST
+        self.quick = [
+            quick(segment, before) if few else None for segment, before in zip(self.segments, self.before, strict=True)
+        ]
+        return self.quick
+
     def columns(self, rest: Fixed) -> "Columns":
         """The segments as columns, for a start `rest` after a whole ns; the last ones asked for are kept."""
         if self._columns is None or self._columns[0] != rest:
@@ -65,21 +75,28 @@ class Shape:
 
         A small shape keeps all its times: the same ramps come again and again.
         """
-        import numpy as np
-
         if self.steps is None or self.steps > SMALL:
             self._fill(out, first, start)
             return
         whole, rest = start >> FIXED_BITS, start & (ONE_NS - 1)
-        if self._kept is None or self._kept[0] != rest:
+        kept = self._kept
+        if kept is None and len(out) == self.steps:
+            self._fill(out, first, start)
+            self._kept = -1, out[:0]  # whoever comes a second time will come again
+            return
+        import numpy as np
+
+        if kept is None or kept[0] != rest:
             times = np.empty(self.steps, np.int64)
             self._fill(times, 1, rest)
-            self._kept = rest, times
-        np.add(self._kept[1][first - 1 : first - 1 + len(out)], whole, out=out)
+            self._kept = kept = rest, times
+        np.add(kept[1][first - 1 : first - 1 + len(out)], whole, out)
 
     def _fill(self, out: Int64Array, first: int, start: Fixed) -> None:
-        from detent.pulses.filling import fill
+        from detent.pulses import filling, short
 
+        if len(out) == self.steps and short.fill(out, self.segments, self.before, start):
+            return
         last = first + len(out) - 1
         i, stop = bisect_left(self.through, first), bisect_left(self.through, last)
         if stop - i > 8 and len(out) < SHORT * (stop - i):
@@ -91,6 +108,6 @@ class Shape:
             through = self.through[i] if i < len(self.through) else last
             count = min(last, through) - n + 1
             if count > 0:
-                fill(out[done : done + count], self.segments[i], n - self.before[i], start)
+                filling.fill(out[done : done + count], self.segments[i], n - self.before[i], start)
                 done += count
             i += 1

@@ -4,6 +4,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from detent.pulses.accelerating import NS_PER_FIXED
 from detent.pulses.laws import AnySegment
 from detent.pulses.segment import Immutable, Int64Array, State
 from detent.pulses.shape import Shape
@@ -119,12 +120,20 @@ class Train(Immutable):
 
     def state_at(self, t: Ns) -> State:
         """Steps, phase and rate at `t`."""
-        t = int(t)
-        steps = self.steps_by(t)
-        shape, instant = self._shape, (t << FIXED_BITS) - self.start
+        shape, instant = self._shape, (int(t) << FIXED_BITS) - self.start
         i = bisect_right(shape.begins, instant) - 1
         if i < 0:
-            return State(steps, 0.0, 0.0)
+            return State(self.steps_by(t), 0.0, 0.0)
+        quick = (shape.quick or shape.make_quick())[i]
+        if quick is not None:
+            anchor, end, x, linear, square, low, high, before, rate, change = quick
+            tau = (instant - anchor) * NS_PER_FIXED
+            done = x + tau * (linear + square * tau)
+            whole = int(done)
+            phase = done - whole
+            if low < phase < high and instant < end:
+                return _state(State, (before + whole, phase, rate + change * tau))
+        steps = self.steps_by(t)
         if i < len(shape.ends) and instant >= shape.ends[i]:
             return State(steps, 0.0, 0.0)  # in a gap, or after the end
         done, rate = shape.segments[i].progress(instant)
@@ -264,4 +273,5 @@ class Train(Immutable):
 
 
 _new = object.__new__
+_state = tuple.__new__  # a named tuple's own takes as long as all the rest
 _set = object.__setattr__
