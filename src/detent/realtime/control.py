@@ -1,5 +1,7 @@
 """A cell that is served, looked at and meddled with: the verbs of `realtime.verbs`, arguments in, answers out.
 
+What can be looked at and meddled with so is a `realtime.subject.Subject`.
+
 Nothing here knows who asks. `Control.do` is for the thread that serves; `ask` and `call` are for every other one.
 """
 
@@ -9,14 +11,16 @@ from concurrent.futures import CancelledError, Future
 from concurrent.futures import TimeoutError as TooLate
 from typing import Final
 
-from detent.cell.actions import TimedAction
+from detent.cell.actions import Break, Discard, Mend, Power, Release, Send, SetPin, SetSwitch, TimedAction, Type
+from detent.cell.cell import Cell
+from detent.cell.history import Broken
 from detent.pins import LOW
 from detent.realtime import breaking, verbs
 from detent.realtime.boards.driven import Driven
 from detent.realtime.names import Names
 from detent.realtime.picture import level_of, pins_of, real_state, switches_of, time_of, whole_state
 from detent.realtime.plain import as_json
-from detent.realtime.service import Service
+from detent.realtime.subject import Subject
 from detent.realtime.verbs import Answer, AskedWrongly, Json
 from detent.realtime.waiting import Condition, at_position, at_time
 from detent.realtime.watch import Watch
@@ -33,15 +37,14 @@ class Ending(RuntimeError):
 
 
 class Control:
-    """The verbs of one `service`, which must be observed."""
+    """The verbs of one `subject`, which must be observed."""
 
-    def __init__(self, service: Service) -> None:
-        """Raises ValueError for a service that is not observed."""
-        if service.watched is None or service.watch is None:
+    def __init__(self, subject: Subject) -> None:
+        """Raises ValueError for one that is not observed."""
+        if subject.watched is None or subject.watch is None:
             raise ValueError("the service keeps no watch: make it with observed=True")
-        self._service, self._cell, self._pace = service, service.cell, service.pace
-        self._watched = service.watched
-        self._names = Names(service.cell)
+        self._subject, self._pace = subject, subject.pace
+        self._watched = subject.watched
         self._lock = threading.Lock()  # over the two that follow
         self._ended = False
         self._waited_for: set[Future[Answer]] = set()
@@ -55,6 +58,7 @@ class Control:
             "power": self._power,
             "pause": self._stand,
             "resume": self._go,
+            "present": self._present,
             "step": self._step,
             "run-for": self._run_for,
             "pace": self._change_pace,
@@ -80,12 +84,20 @@ class Control:
         self._refuse_on_real_pins(verb, arguments)
         try:
             answer = self._does[verb](arguments)
-        except (ValueError, KeyError) as error:
+        except (ValueError, KeyError, Broken) as error:
             if isinstance(error, AskedWrongly):
                 raise
             raise AskedWrongly.of(error) from None
         self._watched.look()
         return answer
+
+    @property
+    def _cell(self) -> Cell:
+        return self._subject.cell
+
+    @property
+    def _names(self) -> Names:
+        return Names(self._subject.cell)
 
     def ask(self, verb: str, given: Mapping[str, object]) -> "Future[Answer]":
         """The same from any thread; cancelled when the cell is not served any more. Raises Ending."""
@@ -95,7 +107,7 @@ class Control:
                 raise Ending("the cell is not served any more")
             self._waited_for.add(promised)
         promised.add_done_callback(self._waited_for.discard)
-        asked = self._service.ask(lambda: self.do(verb, given))
+        asked = self._subject.ask(lambda: self.do(verb, given))
 
         def pass_on(done: "Future[Answer]") -> None:
             if done.cancelled():
@@ -160,18 +172,17 @@ class Control:
     # -- looking -----------------------------------------------------------------------------------------
 
     def _state(self, _: Given) -> Answer:
-        return {**whole_state(self._service), "faults": self._list_faults()}
+        return {**whole_state(self._subject), "faults": self._list_faults()}
 
     def _pins(self, given: Given) -> Answer:
         units = [self._names.unit(given)] if "unit" in given else list(self._names.units)
-        return {"time_ns": self._cell.now, "pins": {unit: pins_of(self._service, unit) for unit in units}}
+        return {"time_ns": self._cell.now, "pins": {unit: pins_of(self._subject, unit) for unit in units}}
 
     def _journal(self, given: Given) -> Answer:
-        journal = self._cell.journal
+        forgotten, journal = self._subject.journal()
         last = given.get("last", 100)
         assert isinstance(last, int)
-        forgotten = getattr(journal, "forgotten", 0)
-        newest = list(journal)[-last:] if last else []
+        newest = journal[-last:] if last else []
         return {"deeds": forgotten + len(journal), "complete": not forgotten, "journal": [_told(a) for a in newest]}
 
     def _faults(self, _: Given) -> Answer:
@@ -191,13 +202,13 @@ class Control:
     # -- real pins ---------------------------------------------------------------------------------------
 
     def _watch(self) -> Watch:
-        watch = self._service.watch
+        watch = self._subject.watch
         assert watch is not None
         return watch
 
     def _refuse_on_real_pins(self, verb: str, given: Given) -> None:
         """What a motor cannot follow, or what would make the cell blind to a switch of the machine."""
-        driven = self._service.driven
+        driven = self._subject.driven
         if driven is None:
             return
         if verb in ("pause", "resume", "step", "run-for", "pace") or (verb == "wait" and given.get("pause")):
@@ -211,7 +222,7 @@ class Control:
                 raise AskedWrongly(f"{unit}.{pin} is an input of a board", "its level is that of the pin")
 
     def _driven(self) -> Driven:
-        driven = self._service.driven
+        driven = self._subject.driven
         if driven is None:
             raise AskedWrongly("no real pins are driven", "serve the cell with --real")
         return driven
@@ -231,26 +242,26 @@ class Control:
 
     def _set(self, given: Given) -> Answer:
         unit, pin = self._names.pin(given)
-        self._cell.set_pin(unit, pin, breaking.level(given))
+        self._subject.do(SetPin(unit, pin, breaking.level(given)))
         return self._now()
 
     def _release(self, given: Given) -> Answer:
         unit, pin = self._names.pin(given)
-        self._cell.release(unit, pin)
+        self._subject.do(Release(unit, pin))
         return self._now()
 
     def _switch(self, given: Given) -> Answer:
-        known = switches_of(self._service)
+        known = switches_of(self._subject)
         name = str(given["switch"])
         if name not in known:
             raise verbs.unknown("switch", name, list(known))
         if name not in self._cell.wiring.names:
             raise AskedWrongly(f"{name} is moved by a rotor", f"let it stick: fault {name} stuck")
-        self._cell.set_switch(name, breaking.level(given))
+        self._subject.do(SetSwitch(name, breaking.level(given)))
         return self._now()
 
     def _power(self, given: Given) -> Answer:
-        self._cell.power(self._names.unit(given), bool(given["on"]))
+        self._subject.do(Power(self._names.unit(given), bool(given["on"])))
         return self._now()
 
     def _type(self, given: Given) -> Answer:
@@ -258,7 +269,7 @@ class Control:
         line = self._cell.wiring.line_of[self._cell.unit(unit)]
         if line >= 0:
             self._refuse_a_long_queue(line, len(self._cell.serial_unit(unit).frame(text)))
-        self._cell.type(unit, text)
+        self._subject.do(Type(unit, text))
         return self._now()
 
     def _send(self, given: Given) -> Answer:
@@ -268,11 +279,11 @@ class Control:
             raise AskedWrongly("data has characters that are no bytes", r"write them like \r or \x1b") from None
         line = self._names.line(given.get("line"))
         self._refuse_a_long_queue(line, len(data))
-        self._cell.send(line, data)
+        self._subject.do(Send(line, data))
         return self._now()
 
     def _clear(self, given: Given) -> Answer:
-        self._cell.discard(self._names.line(given.get("line")))
+        self._subject.do(Discard(self._names.line(given.get("line"))))
         return self._now()
 
     def _refuse_a_long_queue(self, number: int, more: int) -> None:
@@ -288,68 +299,80 @@ class Control:
     # -- time --------------------------------------------------------------------------------------------
 
     def _now(self) -> Answer:
-        return time_of(self._service)
+        return time_of(self._subject)
 
     def _stand(self, _: Given) -> Answer:
         self._end_step()
-        if not self._pace.held:
-            self._pace.hold(self._cell.now)
+        self._subject.stand()
         return self._now()
 
     def _go(self, _: Given) -> Answer:
         self._end_step()
-        if self._pace.held:
-            self._pace.go(self._cell.now)
+        self._subject.go()
+        return self._now()
+
+    def _present(self, _: Given) -> Answer:
+        self._subject.present()
         return self._now()
 
     def _step(self, given: Given) -> "Answer | Future[Answer]":
-        cell = self._cell
         self._end_step()
         time = given.get("time")
         if isinstance(time, int):
             stepping: Future[Answer] = Future()
-            self._step_on(cell.now + time, stepping)
+            self._step_on(self._cell.now + time, stepping)
             return stepping.result() if stepping.done() else stepping
-        cell.step()
-        self._pace.hold(cell.now)
+        self._subject.step_event()
         return self._now()
 
     def _step_on(self, goal: Ns, stepping: "Future[Answer]") -> None:
         """Go on towards `goal` for a while; then it is the turn of the lines and of other requests."""
         if stepping.done():  # nobody waits for it any more, or another word about time has ended it
             return
-        cell = self._cell
         self._stepping = stepping
         try:
             for _ in range(SLICE):
-                at = cell.next_event()
-                cell.run_to(goal if at is None else min(at, goal))
+                at = self._cell.next_event()
+                goes_on = self._subject.run_on(goal if at is None else min(at, goal))
                 self._watched.look()
-                if stepping.done() or cell.now == goal:
+                if stepping.done() or self._cell.now == goal:
+                    break
+                if not goes_on:
+                    self._end_step()
                     break
         except Exception as error:
             if not stepping.done() and stepping.set_running_or_notify_cancel():
                 stepping.set_exception(error)
             raise
         finally:
-            self._pace.hold(cell.now)
-        if cell.now < goal:
-            following = self._service.ask(lambda: self._step_on(goal, stepping))
+            self._pace.hold(self._cell.now)
+        if stepping.done():
+            return
+        if self._cell.now < goal:
+            following = self._subject.ask(lambda: self._step_on(goal, stepping))
             following.add_done_callback(lambda ended: stepping.cancel() if ended.cancelled() else None)
-        elif not stepping.done() and stepping.set_running_or_notify_cancel():
+        elif stepping.set_running_or_notify_cancel():
             stepping.set_result(self._now())
 
     def _end_step(self) -> None:
         """Another word about time ends a step that takes long: whoever waits for it is told where the cell stands."""
         stepping, self._stepping = self._stepping, None
         if stepping is not None and not stepping.done() and stepping.set_running_or_notify_cancel():
-            stepping.set_result({"reached": False, **whole_state(self._service)})
+            stepping.set_result({"reached": False, **whole_state(self._subject)})
 
     def _run_for(self, given: Given) -> "Future[Answer]":
         time = given["time"]
         assert isinstance(time, int)
-        reached = self._watched.wait([at_time(self._cell, self._cell.now + time)], self._reached_and_stand)
-        self._go({})
+        goal = at_time(lambda: self._cell, self._cell.now + time)
+        return self._going(self._watched.wait([goal], self._reached_and_stand))
+
+    def _going(self, reached: "Future[Answer]") -> "Future[Answer]":
+        """Time goes on, for the one who waits. Raises AskedWrongly, and then nobody waits."""
+        try:
+            self._go({})
+        except Exception:
+            reached.cancel()
+            raise
         return reached
 
     def _reached(self) -> Answer:
@@ -363,44 +386,45 @@ class Control:
         pace = given["pace"]
         assert pace is None or isinstance(pace, float)
         held = self._pace.held
-        self._pace.change(pace, self._cell.now)
+        self._subject.change_pace(pace)
         assert self._pace.held == held
         return self._now()
 
     def _wait(self, given: Given) -> "Future[Answer]":
-        cell = self._cell
         conditions: list[Condition] = []
         if "state" in given:
             unit = self._names.unit(given)
             words = [word.strip() for word in str(given["state"]).split(",")]
             axis = self._names.axis(unit, given)
-            conditions.append(Condition(lambda: cell.controller(unit).status(cell.now, axis).state in words))
+            conditions.append(Condition(lambda: self._course(unit, axis) in words))
         if "position" in given:
             unit, position = self._names.unit(given), given["position"]
             assert isinstance(position, int)
-            conditions.append(at_position(cell, self._watch, unit, self._names.axis(unit, given), position))
+            where = self._names.axis(unit, given)
+            conditions.append(at_position(lambda: self._cell, self._watch, unit, where, position))
         if "pin" in given:
             name, text = self._names.pin(given, outputs=True)
             level = given.get("level", LOW)
-            conditions.append(Condition(lambda: level_of(self._service, name, text) == level))
+            conditions.append(Condition(lambda: level_of(self._subject, name, text) == level))
         elif "level" in given:
             raise AskedWrongly("wait: a level of what", "name the pin too")
         if isinstance(time := given.get("time"), int):
-            conditions.append(at_time(cell, time))
+            conditions.append(at_time(lambda: self._cell, time))
         if not conditions:
             raise AskedWrongly("wait: for what", "name a state, a position, a pin with its level, or a time")
         reached = self._watched.wait(conditions, self._reached_and_stand if given.get("pause") else self._reached)
-        if given.get("resume") and not reached.done():
-            self._go({})
-        return reached
+        return self._going(reached) if given.get("resume") and not reached.done() else reached
+
+    def _course(self, unit: str, axis: str) -> str:
+        return self._cell.controller(unit).status(self._cell.now, axis).state
 
     # -- faults ------------------------------------------------------------------------------------------
 
     def _fault(self, given: Given) -> Answer:
         lasting = given.get("for")
         assert lasting is None or isinstance(lasting, int)
-        number = self._cell.breaks(breaking.meant(self._names, given), lasting)
-        return {"fault": number, **self._now()}
+        self._subject.do(Break(breaking.meant(self._names, given), lasting))
+        return {"fault": self._cell.faults.last, **self._now()}
 
     def _mend(self, given: Given) -> Answer:
         number = given.get("fault")
@@ -412,7 +436,7 @@ class Control:
         else:
             raise verbs.unknown("fault", str(number), [str(known) for known in standing])
         for one in numbers:
-            self._cell.mend(one)
+            self._subject.do(Mend(one))
         mended: list[Json] = list(numbers)
         return {"mended": mended, **self._now()}
 

@@ -11,36 +11,36 @@ from detent.controllers.device import Cautioned, Powered, Refused
 from detent.pins import Level, Pin
 from detent.realtime.boards.driven import Driven
 from detent.realtime.plain import as_json
-from detent.realtime.service import Service
+from detent.realtime.subject import Subject
 from detent.realtime.verbs import Answer, Json
 from detent.realtime.watch import Event, Watch
 
 F = TypeVar("F", StuckPin, StuckSwitch)
 
 
-def time_of(service: Service) -> Answer:
+def time_of(subject: Subject) -> Answer:
     """The time of the cell, and whether it stands."""
-    pace = service.pace
+    pace = subject.pace
     factor = None if pace.free else float(pace.factor)
-    stopped: Answer = {"stopped": service.stopped} if service.stopped else {}
-    return {"time_ns": service.cell.now, "paused": pace.held, "pace": factor, **stopped}
+    stopped: Answer = {"stopped": subject.stopped} if subject.stopped else {}
+    return {"time_ns": subject.cell.now, "paused": pace.held, "pace": factor, **subject.standing(), **stopped}
 
 
-def whole_state(service: Service) -> Answer:
+def whole_state(subject: Subject) -> Answer:
     """Everything but the faults."""
-    cell, late = service.cell, service.lateness()
+    cell, late = subject.cell, subject.lateness()
     names = cell.wiring.names[: cell.wiring.units]
     return {
-        **time_of(service),
+        **time_of(subject),
         "late_ns": {"deadlines": late.deadlines, "p50": late.p50, "p99": late.p99, "most": late.most},
-        "units": {name: unit_state(service, name) for name in names},
-        "lines": {name: _line(service, number) for number, name in enumerate(cell.wiring.line_names)},
-        "switches": switches_of(service),
+        "units": {name: unit_state(subject, name) for name in names},
+        "lines": {name: _line(subject, number) for number, name in enumerate(cell.wiring.line_names)},
+        "switches": switches_of(subject),
         "motors": {
             cell.wiring.names[n]: _motor(cell, part) for n, part in enumerate(cell.parts) if isinstance(part, Mechanics)
         },
-        "events": _events(service),
-        **({} if service.driven is None else {"real": real_state(service.driven)}),
+        "events": _events(subject),
+        **({} if subject.driven is None else {"real": real_state(subject.driven)}),
     }
 
 
@@ -54,14 +54,14 @@ def real_state(driven: Driven) -> Answer:
     return {"axes": axes, "boards": boards, "escaped": driven.escaped, "stops": driven.rewinds}
 
 
-def unit_state(service: Service, name: str) -> Answer:
+def unit_state(subject: Subject, name: str) -> Answer:
     """How a unit stands."""
-    cell, watch = service.cell, _watch(service)
+    cell, watch = subject.cell, _watch(subject)
     index = cell.unit(name)
     seen = watch.of_unit[index]
     front = seen.front
     found: Answer = {
-        "model": service.description.units[name].model,
+        "model": subject.description.units[name].model,
         "powered": cell.circuit.supplied(index),
         "pins": {pin.name: front.levels[pin.name] for pin in _pins(cell, index)},
         "received": seen.received,
@@ -84,13 +84,13 @@ def unit_state(service: Service, name: str) -> Answer:
     }
 
 
-def pins_of(service: Service, name: str) -> dict[str, dict[str, Json]]:
+def pins_of(subject: Subject, name: str) -> dict[str, dict[str, Json]]:
     """The inputs, straps and outputs of a unit; the level is None where an output is let go, or nobody has asked."""
-    cell, circuit = service.cell, service.cell.circuit
+    cell, circuit = subject.cell, subject.cell.circuit
     index, stuck = cell.unit(name), {f.pin for f in _faults(cell, StuckPin) if f.unit == name}
     return {
         pin.name: {
-            "level": level_of(service, name, pin.name),
+            "level": level_of(subject, name, pin.name),
             "kind": pin.kind.value,
             "wired": (circuit.net_driven if pin.kind.drives else circuit.net_read)(index, pin.name) is not None,
             "stuck": pin.name in stuck,
@@ -99,15 +99,15 @@ def pins_of(service: Service, name: str) -> dict[str, dict[str, Json]]:
     }
 
 
-def level_of(service: Service, name: str, pin: str) -> Level | None:
+def level_of(subject: Subject, name: str, pin: str) -> Level | None:
     """The level of a pin of a unit; None where an output is let go, or nobody has asked."""
-    return _watch(service).of_unit[service.cell.unit(name)].front.levels[pin]
+    return _watch(subject).of_unit[subject.cell.unit(name)].front.levels[pin]
 
 
-def switches_of(service: Service) -> dict[str, Json]:
+def switches_of(subject: Subject) -> dict[str, Json]:
     """The contacts of the cell: the level that each gives, and whether it is stuck there."""
-    cell = service.cell
-    names = dict.fromkeys(service.description.switches)
+    cell = subject.cell
+    names = dict.fromkeys(subject.description.switches)
     names |= dict.fromkeys(n for n, part in zip(cell.wiring.names, cell.parts, strict=True) if isinstance(part, Switch))
     stuck = {fault.switch: fault.level for fault in _faults(cell, StuckSwitch)}
     found: dict[str, Json] = {}
@@ -124,22 +124,22 @@ def _pins(cell: Cell, unit: int) -> list[Pin]:
     return [pin for pin in cell.parts[unit].pins if pin.kind.drives or pin.kind.reads]
 
 
-def _watch(service: Service) -> Watch:
-    assert service.watch is not None
-    return service.watch
+def _watch(subject: Subject) -> Watch:
+    assert subject.watch is not None
+    return subject.watch
 
 
 def _faults(cell: Cell, kind: type[F]) -> Sequence[F]:
     return [fault for fault in cell.faults.standing.values() if isinstance(fault, kind)]
 
 
-def _line(service: Service, number: int) -> Answer:
-    cell, watch = service.cell, _watch(service)
+def _line(subject: Subject, number: int) -> Answer:
+    cell, watch = subject.cell, _watch(subject)
     line, units = cell.lines[number], [unit for unit, _ in cell.wiring.lines[number]]
     return {
         "format": str(line.format),
         "units": [cell.wiring.names[unit] for unit in units],
-        "endpoints": [f"{kind} {address}" for at, kind, address in service.addresses() if at == number],
+        "endpoints": [f"{kind} {address}" for at, kind, address in subject.addresses() if at == number],
         "received": max(watch.of_unit[unit].received for unit in units),
         "sent": sum(watch.of_unit[unit].sent for unit in units),
     }
@@ -150,10 +150,10 @@ def _motor(cell: Cell, motor: Mechanics) -> Answer:
     return {"place": float(motor.place_of(rotor.angle)), "command": motor.command(cell.now), "rad_per_s": rotor.speed}
 
 
-def _events(service: Service) -> list[Json]:
+def _events(subject: Subject) -> list[Json]:
     """The newest, in order of time: refusals and cautions, supplies, images, characters that faults have changed."""
-    cell = service.cell
-    found = [(event.at, cell.wiring.names[unit], _event(event)) for unit, event in _watch(service).events]
+    cell = subject.cell
+    found = [(event.at, cell.wiring.names[unit], _event(event)) for unit, event in _watch(subject).events]
     for number, strike in cell.faults.strikes():
         told = as_json(strike) | {"event": "lost" if strike.after is None else "damaged"}
         found.append((strike.at, cell.wiring.line_names[number], told))

@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
+from detent.cell.actions import Action, TimedAction
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.circuit import Oscillation
@@ -32,8 +33,10 @@ from detent.realtime.guarded import Guarded
 from detent.realtime.images import Images
 from detent.realtime.loop import BEHIND, Loop, Timer, stopped_by_signals, wake_exactly
 from detent.realtime.pace import LatenessSummary, Pace
+from detent.realtime.verbs import Answer
 from detent.realtime.waiting import Watched
 from detent.realtime.watch import RecentLog, Watch
+from detent.ticks import Ns
 from detent.uart import Format
 
 T = TypeVar("T")
@@ -190,6 +193,46 @@ class Service:
     def stop(self) -> None:
         """End `run` soon; from any thread."""
         self._loop.stop()
+
+    def journal(self) -> tuple[int, Sequence[TimedAction]]:
+        """How many deeds are forgotten, and those behind them."""
+        journal = self.cell.journal
+        return int(getattr(journal, "forgotten", 0)), list(journal)
+
+    def standing(self) -> Answer:
+        """Of its time nothing else is to be said."""
+        return {}
+
+    def do(self, action: Action) -> None:
+        """Do it, now. Raises what `Cell.do` does."""
+        self.cell.do(action)
+
+    def stand(self) -> None:
+        """Its time stands."""
+        if not self.pace.held:
+            self.pace.hold(self.cell.now)
+
+    def go(self) -> None:
+        """Its time goes on."""
+        if self.pace.held:
+            self.pace.go(self.cell.now)
+
+    def present(self) -> None:
+        """It has no past in which it could stand."""
+
+    def step_event(self) -> None:
+        """The next eventful instant; then it stands."""
+        self.cell.step()
+        self.pace.hold(self.cell.now)
+
+    def run_on(self, until: Ns) -> bool:
+        """Go on towards `until`, as fast as it can. Raises what the cell does."""
+        self.cell.run_to(until)
+        return True
+
+    def change_pace(self, factor: float | None) -> None:
+        """So many times as fast as real time; None: free. Raises ValueError."""
+        self.pace.change(factor, self.cell.now)
 
     def lateness(self) -> LatenessSummary:
         """How late the deadlines of the cell were served."""

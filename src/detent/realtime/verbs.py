@@ -186,6 +186,7 @@ VERBS: Final[Mapping[str, Verb]] = {
         Verb("power", "Switch the supply of a unit.", (Parameter("on", FLAG, "on or off", True), UNIT)),
         Verb("pause", "Let the cell time stand. What clients send waits."),
         Verb("resume", "Let the cell time go on."),
+        Verb("present", "Of a workbench that looks into the past: the cell stands at its present again."),
         Verb("step", "While it stands: everything of the next eventful instant, or of a time; it stands again behind.",
              (Parameter("time", TIME, "how long the cell goes on, as fast as it can; one event without it"), TIMEOUT)),
         Verb("run-for", "Let the cell go on for a time, at its pace; then it stands. Answers when it does.",

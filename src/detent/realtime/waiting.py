@@ -100,6 +100,13 @@ class Watched:
         if self._waiters:
             self._waiters = [waiter for waiter in self._waiters if not waiter.over()]
 
+    def give_up(self, answer: Callable[[], Answer]) -> None:
+        """What is waited for is no more: everybody is told so."""
+        waiters, self._waiters = self._waiters, []
+        for waiter in waiters:
+            if waiter.future.set_running_or_notify_cancel():
+                waiter.future.set_result(answer())
+
     def close(self) -> None:
         """Nobody needs to wait any longer."""
         for waiter in self._waiters:
@@ -107,13 +114,17 @@ class Watched:
         self._waiters = []
 
 
-def at_position(cell: Cell, watch: Callable[[], Watch], unit: str, axis: str, position: int) -> Condition:
+def at_position(
+    now: Callable[[], Cell], watch: Callable[[], Watch], unit: str, axis: str, position: int
+) -> Condition:
     """The axis of a unit is at a position. The pulse that brings it there is an instant to look at."""
 
     def holds() -> bool:
+        cell = now()
         return cell.controller(unit).status(cell.now, axis).position == position
 
     def following() -> Ns:
+        cell = now()
         controller, motion = cell.controller(unit), watch().of_unit[cell.unit(unit)].front.travels[axis].motion
         if motion is None:
             return NEVER
@@ -126,6 +137,6 @@ def at_position(cell: Cell, watch: Callable[[], Watch], unit: str, axis: str, po
     return Condition(holds, following)
 
 
-def at_time(cell: Cell, time: Ns) -> Condition:
+def at_time(now: Callable[[], Cell], time: Ns) -> Condition:
     """The time of the cell has come."""
-    return Condition(lambda: cell.now >= time, lambda: time if cell.now < time else NEVER)
+    return Condition(lambda: now().now >= time, lambda: time if now().now < time else NEVER)
