@@ -46,6 +46,14 @@ def test_a_pace_that_is_none_is_told(capsys: pytest.CaptureFixture[str]) -> None
     assert "--pace" in wrong(capsys, "--pace", "0")
 
 
+def test_where_programs_are_let_in_is_checked_before_anything_is_opened(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert "--control: 'here' is no HOST:PORT" in wrong(capsys, "--control", "here")
+    told = wrong(capsys, "gs-c200", "--control", "0.0.0.0:0", "--port", "0", "--state", tmp_path)
+    assert "open to other computers" in told
+
+
 def test_a_model_that_there_is_not_is_told_with_the_likeliest(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -382,6 +382,12 @@ def test_what_waits_on_a_line_has_a_bound_and_can_be_dropped(cell: Control) -> N
     assert state["lines"]["slide"]["received"] == 3 + 3, "what had begun when the rest was dropped, and V1 CR"
 
 
+def test_what_is_typed_is_never_another_character_on_the_line(cell: Control) -> None:
+    with pytest.raises(AskedWrongly, match=r"'\u20ac' is on no line of these units; write ASCII, or bytes with send"):
+        cell.call("type", {"unit": "slide", "text": "V1\u20ac"})
+    assert cell.call("journal", {})["journal"] == []
+
+
 def test_a_wait_in_the_midst_of_a_step_is_met_in_its_instant_and_may_end_it(cell: Control) -> None:
     began = cell.call("pause", {})["time_ns"]
     assert isinstance(began, int)

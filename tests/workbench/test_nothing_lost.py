@@ -1,18 +1,20 @@
 """Nothing is lost: files are not written over unasked, and what is sent into a standing cell waits in the open."""
 
 import asyncio
-from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from tests.workbench.patience import PATIENCE
 
 from detent.workbench import filing
+from detent.workbench.client import Bench, BenchError
 from detent.workbench.drafts import Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
-from detent.workbench.waiting import Waiting
+from detent.workbench.messages import State
+from detent.workbench.waiting import MOST, Waiting, Waits
+from detent.workbench.words import check_typed
 
 
 def saved(folder: Path, *arguments: object) -> Any:
@@ -37,101 +39,86 @@ def test_ones_own_file_is_written_as_long_as_nobody_else_has_changed_it(tmp_path
     assert (tmp_path / "bar.gsc").read_text() == "+3\n"
 
 
-class Bench:
-    """A bench of one unit that keeps what it is sent."""
-
-    def __init__(self, held: bool) -> None:
-        self.state = SimpleNamespace(held=held, real=None)
-        self.picture = SimpleNamespace(
-            units={"bar": SimpleNamespace(line="bar")}, lines={"bar": SimpleNamespace(host=None)}
-        )
-        self.sent: list[object] = []
-        self.changed: Callable[[], None] = lambda: None
-
-    def on_change(self, callback: Callable[[], None]) -> None:
-        self.changed = callback
-
-    async def type(self, unit: str, text: str) -> None:
-        await asyncio.sleep(0)  # it goes to another process
-        if text == "BAD":
-            raise RuntimeError("no command")
-        self.sent.append((unit, text))
-
-    async def send(self, line: str, data: bytes) -> None:
-        self.sent.append(data)
+def waiting(*lines: str) -> Waiting:
+    found = Waiting()
+    for text in lines:
+        found.put("bar", "bar", text)
+    return found
 
 
-def test_what_is_sent_while_the_cell_stands_waits_and_can_be_taken_back() -> None:
-    async def scene() -> None:
-        bench, live = Bench(held=True), Live()
-        waiting = Waiting(bench, live)  # type: ignore[arg-type]
-        await waiting.type("bar", "+100")
-        await waiting.type("bar", "Z")
-        await waiting.send("bar", b"V1\r")
-        assert bench.sent == []
-        assert live.get("queue") == [[1, "bar", "bar", "+100"], [2, "bar", "bar", "Z"], [3, "bar", None, "V1\r"]]
-        waiting.withdraw(2)
-        await waiting.out()
-        assert bench.sent == [("bar", "+100"), b"V1\r"]
-        assert live.get("queue") == []
+def texts(queue: Waiting) -> list[str]:
+    return [one.text for one in queue.queue]
 
-    asyncio.run(scene())
+
+def test_what_waits_can_be_taken_back() -> None:
+    queue = waiting("+100", "Z")
+    queue.put("drill", None, "V1\r")
+    queue.put("bar", "bar", "C1")
+    assert [tuple(one) for one in queue.queue[1:3]] == [(2, "bar", "bar", "Z"), (3, "drill", None, "V1\r")]
+    queue.withdraw(2)
+    assert texts(queue) == ["+100", "V1\r", "C1"]
+    queue.drop("bar")
+    assert texts(queue) == ["V1\r"]
+    queue.withdraw(None)
+    assert texts(queue) == []
 
 
 def test_a_command_that_is_refused_on_its_way_out_does_not_take_the_others_along() -> None:
-    async def scene() -> None:
-        bench, live = Bench(held=True), Live()
-        waiting = Waiting(bench, live)  # type: ignore[arg-type]
-        await waiting.type("bar", "BAD")
-        await waiting.type("bar", "+1")
-        with pytest.raises(RuntimeError, match="no command"):
-            await waiting.out()
-        assert live.get("queue") == [[2, "bar", "bar", "+1"]]
-        with pytest.raises(ValueError, match="no line 'foo'"):
-            await waiting.send("foo", b"x")
+    queue, sent = waiting("BAD", "+1", "+2"), list[str]()
 
-    asyncio.run(scene())
+    def send(one: Waits) -> None:
+        if one.text == "BAD":
+            raise ValueError("no command")
+        sent.append(one.text)
+
+    with pytest.raises(ValueError, match="no command"):
+        queue.out(send)
+    assert texts(queue) == ["+1", "+2"]
+    queue.out(send)
+    queue.out(send)
+    assert sent == ["+1", "+2"], "once, however often time is told to go on"
+
+
+def test_a_queue_has_a_bound_and_goes_on_with_its_numbers_in_another_engine() -> None:
+    queue = waiting(*(["V1"] * MOST))
+    with pytest.raises(ValueError, match="1000 commands wait already"):
+        queue.put("bar", "bar", "V1")
+    queue.withdraw(5)
+    again = Waiting(queue.queue)
+    again.put("bar", "bar", "V2")
+    assert again.queue[-1].number == MOST + 1
 
 
 @pytest.mark.parametrize("text", ["\u20ac", "V1\rV1", "\xb0"])
-def test_what_no_line_can_carry_is_refused_before_it_waits(text: str) -> None:
-    waiting = Waiting(Bench(held=True), Live())  # type: ignore[arg-type]
+def test_what_no_line_can_carry_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="printable ASCII"):
-        asyncio.run(waiting.type("bar", text))
+        check_typed(text)
 
 
-def test_while_time_goes_everything_is_sent_at_once() -> None:
-    bench = Bench(held=False)
-    asyncio.run(Waiting(bench, Live()).type("bar", "+1"))  # type: ignore[arg-type]
-    assert bench.sent == [("bar", "+1")]
+def position(state: State) -> int:
+    return state.units["gs-c200s"].axes[""].position
 
 
-def test_what_waits_is_sent_once_however_often_time_is_told_to_go_on() -> None:
+def test_what_a_window_sends_into_a_standing_cell_is_checked_before_it_waits() -> None:
     async def scene() -> None:
-        bench, live = Bench(held=True), Live()
-        waiting = Waiting(bench, live)  # type: ignore[arg-type]
-        for text in ("+1", "+2", "+3"):
-            await waiting.type("bar", text)
-        await asyncio.gather(waiting.out(), waiting.out(), waiting.out())
-        assert bench.sent == [("bar", "+1"), ("bar", "+2"), ("bar", "+3")]
+        bench = await Bench.open("gs-c200s", straps=("CHS=low",), held=True)
+        try:
+            for refused, error in (
+                (bench.queue_send("foo", b"x"), "no line 'foo'"),
+                (bench.queue_type("foo", "V1"), "foo"),
+            ):
+                with pytest.raises(BenchError, match=error):
+                    await refused
+            await bench.queue_type("gs-c200s", "+1")
+            assert [one.text for one in bench.state.queue] == ["+1"]
+            await bench.step_event()
+            assert bench.state.queue == ()
+            await bench.go()
+            await bench.until(lambda state: state.units["gs-c200s"].state == "ready" and position(state) == 1)
+            await bench.queue_type("gs-c200s", "+2")
+            assert bench.state.queue == (), "while time goes everything is sent at once"
+            await bench.until(lambda state: position(state) == 3)
+        finally:
+            await bench.close()
 
-    asyncio.run(scene())
-
-
-def test_what_comes_to_wait_while_time_is_told_to_go_on_goes_out_as_soon_as_it_does() -> None:
-    async def scene() -> None:
-        bench, live = Bench(held=True), Live()
-        waiting = Waiting(bench, live)  # type: ignore[arg-type]
-        await waiting.out()  # the first half of a go
-        await waiting.type("bar", "BAD")
-        await waiting.type("bar", "+1")
-        bench.state.held = False  # the second, or a run to the cursor
-        bench.changed()
-        bench.changed()
-        while not bench.sent:
-            await asyncio.sleep(0)
-        assert live.get("queue") == []
-        assert bench.sent == [("bar", "+1")]
-        assert live.get("turneddown") == "BAD: no command"
-
-    asyncio.run(scene())
+    asyncio.run(asyncio.wait_for(scene(), PATIENCE))

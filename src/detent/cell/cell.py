@@ -224,15 +224,19 @@ class Cell:
 
     def type(self, unit: str, text: str) -> None:
         """The host of the unit's line sends the command line `text` to that unit, now."""
-        index = self.unit(unit)
-        line = self.wiring.line_of[index]
-        if line < 0:
-            raise ValueError(f"unit {unit!r} is on no line with a host outside: a unit that is its host can send to it")
+        line = self.hosted_line(unit)
         if not self._acting:
             self._catch_up()
         data = self.serial_unit(unit).frame(text)
         self.circuit.outside.typed(unit, text)
         self.send(line, data)
+
+    def hosted_line(self, unit: str) -> int:
+        """The line of a unit, which has a host outside. Raises KeyError, ValueError without one."""
+        line = self.wiring.line_of[self.unit(unit)]
+        if line < 0:
+            raise ValueError(f"unit {unit!r} is on no line with a host outside: a unit that is its host can send to it")
+        return line
 
     def set_pin(self, unit: str, pin: str, level: Level) -> None:
         """Drive an input pin from outside, now: a hand with a wire. Other drivers of its net are not asked.

@@ -125,6 +125,11 @@ class History:
         return self._present is not None
 
     @property
+    def untold(self) -> int:
+        """Batches that nobody has asked for."""
+        return len(self._fresh)
+
+    @property
     def lines(self) -> Sequence[Line | Deaf]:
         """The lines; in the past they are deaf, and hosts wait."""
         return self.cell.lines if self._present is None else self._deaf
@@ -193,6 +198,10 @@ class History:
         if not self.stopped:
             self.stopped = why
             self._on_stop()
+
+    def journal(self) -> tuple[int, Sequence[TimedAction]]:
+        """How many actions are forgotten, and those behind them, up to where it stands."""
+        return self._first_action, self._actions[: self._here.actions - self._first_action]
 
     def go(self) -> None:
         """Time goes on; in the past, from there. Raises Broken."""

@@ -280,6 +280,12 @@ def _shown(value: object) -> str:
 def _time(answer: Mapping[str, Any]) -> str:
     pace = answer["pace"]
     how = "paused" if answer["paused"] else "free" if pace is None else f"pace {pace:g}"
+    if answer["paused"] and answer.get("why"):  # a workbench knows why
+        how += f" {answer['why']}" if answer["why"].startswith("by ") else f": {answer['why']}"
+    if answer.get("past"):
+        how += f", looking back: the present is {_seconds(answer['present_ns'])}"
+    if waiting := answer.get("waiting"):
+        how += f", {waiting} command{'s wait' if waiting != 1 else ' waits'}"
     return f"{_seconds(answer['time_ns'])}, {how}"
 
 

@@ -108,7 +108,7 @@ def serve(
         if not (math.isfinite(pace) and pace > 0):
             raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
         endpoints = asked_endpoints(links, tcp, rfc2217, serial)
-        control_at = None if control is None else _address("--control", control)
+        control_at = None if control is None else asked_address("--control", control)
         if real and pace != 1:
             raise Problem("", "--pace", "real pins keep real time: leave it out with --real")
         found = find_cell(target, straps=strap, options=set_, pins=pin)
@@ -179,14 +179,14 @@ def asked_endpoints(
         endpoints.append(EndpointSpec("pty", str(links[0]) if links else ""))
     for kind, address in (("tcp", tcp), ("rfc2217", rfc2217)):
         if address is not None:
-            _address(f"--{kind}", address)
+            asked_address(f"--{kind}", address)
             endpoints.append(EndpointSpec(kind, address))
     if serial is not None:
         endpoints.append(EndpointSpec("serial", str(serial)))
     return endpoints
 
 
-def _address(flag: str, text: str) -> "TcpAddress":
+def asked_address(flag: str, text: str) -> "TcpAddress":
     """HOST:PORT of an option. Raises Problem."""
     from detent.cell.description import Problem
     from detent.realtime.endpoints.tcp import TcpAddress

@@ -54,7 +54,7 @@ def service(
     """
     from detent.cell.description import Problem
     from detent.cli.endings import asked_wrongly, failed
-    from detent.cli.serve import _address
+    from detent.cli.serve import asked_address
     from detent.outputs.files import check_outputs, write_whole
     from detent.realtime.cell_source import find_cell
 
@@ -63,7 +63,7 @@ def service(
             raise Problem("", "", f"{cell} is no cell file: a service needs a CELL.toml with its lines and boards")
         found = find_cell(cell)
         if control is not None:
-            _address("--control", control)
+            asked_address("--control", control)
         called = name if name is not None else _name(Path(cell))
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}", called):
             raise Problem("", "--name", f"{called!r}: letters, digits, - and _")

@@ -3,6 +3,7 @@
 import asyncio
 import json as json_text
 import math
+import os
 import sys
 import webbrowser
 from collections.abc import Sequence
@@ -41,6 +42,7 @@ def workbench(
     set_: Annotated[Sequence[str], Parameter(name="--set", negative=())] = (),
     memory: int = 512,
     state: Path | None = None,
+    control: str | None = None,
     real: Annotated[bool, Parameter(negative=())] = False,
     json: bool = False,
     unit: UnitOptions = NO_UNIT_OPTIONS,
@@ -63,7 +65,7 @@ def workbench(
         taken, the next that is free, and it says so.
     token
         Let in only who knows this word of at least 8 characters, on loopback one by chance unless you say; the address
-        that is printed has it.
+        that is printed has it. Programs at --control have to know it, too.
     open_
         Open the address in the browser of this machine.
     folder
@@ -90,6 +92,9 @@ def workbench(
         So many MB, about, the past may take; what is older is dropped, and the time line then begins later.
     state
         Keep EEPROM images and drafts in this folder instead of $XDG_STATE_HOME/detent or ~/.local/state/detent.
+    control
+        Listen on HOST:PORT for programs that look at the same cell and meddle with it, see `detent control`. Port 0:
+        any free port. Any host but loopback needs --token or $DETENT_TOKEN.
     real
         Drive the pins of the boards in the cell file. Time then goes on, and one can only look back.
     json
@@ -99,7 +104,7 @@ def workbench(
     """
     from detent.cell.description import Problem
     from detent.cli.endings import asked_wrongly, failed
-    from detent.cli.serve import asked_endpoints
+    from detent.cli.serve import asked_address, asked_endpoints
     from detent.extras import MissingExtra, need
     from detent.realtime.cell_source import find_cell
     from detent.realtime.examples import home
@@ -120,16 +125,19 @@ def workbench(
         if memory < 256:
             raise Problem("", "--memory", f"{memory} MB are too few; it takes at least 256")
         endpoints = asked_endpoints(links, tcp, rfc2217, serial)
+        control_at = None if control is None else asked_address("--control", control)
         find_cell(shown, straps=strap, options=set_)  # at once, not when everything is loaded
         written = _unit_options(target, at, unit)
     except (Problem, MissingExtra) as error:
         asked_wrongly(error)
+    from detent.realtime.http import TOKEN
     from detent.workbench.client import Bench, BenchError
     from detent.workbench.drafts import Drafts
     from detent.workbench.folder import Folder, OutsideFolder
     from detent.workbench.guard import check_place, is_loopback
     from detent.workbench.listening import USUAL, Place, listen, listen_as_usual
 
+    known = token or os.environ.get(TOKEN)  # to programs; that of chance is for windows
     try:
         if token is None and is_loopback(host):
             token = token_urlsafe(16)  # other users of this computer reach loopback, too
@@ -157,7 +165,7 @@ def workbench(
         opening = asyncio.create_task(
             Bench.open(
                 shown, straps=strap, options=set_, endpoints=endpoints, pace=pace, line_timing=line_timing,
-                state_dir=kept, held=hold, real=real, memory=memory,
+                state_dir=kept, held=hold, real=real, memory=memory, control=control_at, token=known,
             )
         )  # fmt: skip
         server = await asyncio.to_thread(import_module, "detent.workbench.server")  # seconds, while the cell starts
@@ -227,7 +235,7 @@ def _facts(bench: "Bench", url: str) -> dict[str, object]:
         for line in bench.picture.lines.values()
         for one in line.endpoints
     ]
-    return {"url": url, "endpoints": endpoints}
+    return {"url": url, "endpoints": endpoints, "control": bench.control_url}
 
 
 def _print_ready(bench: "Bench", url: str, folder: Path, kept: Path) -> None:
@@ -243,5 +251,7 @@ def _print_ready(bench: "Bench", url: str, folder: Path, kept: Path) -> None:
     width = max((len(line.name) for line, _ in ends), default=0)
     for line, one in ends:
         print(f"  {line.name:{width}}  {one.address}  # {one.kind}, {line.format}")
+    if bench.control_url is not None:
+        print(f"Look at it, meddle with it, break it:\n  detent control {bench.control_url}")
     print(f"Files are opened and saved in {folder}; EEPROM images and drafts are kept in {kept}")
     print("Ctrl-C ends it.", flush=True)

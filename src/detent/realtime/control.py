@@ -45,6 +45,7 @@ class Control:
             raise ValueError("the service keeps no watch: make it with observed=True")
         self._subject, self._pace = subject, subject.pace
         self._watched = subject.watched
+        self._watched.lost = lambda: {"reached": False, **whole_state(subject)}
         self._lock = threading.Lock()  # over the two that follow
         self._ended = False
         self._waited_for: set[Future[Answer]] = set()
@@ -266,6 +267,9 @@ class Control:
 
     def _type(self, given: Given) -> Answer:
         unit, text = self._names.unit(given), str(given["text"])
+        foreign = next((character for character in text if not character.isascii()), None)
+        if foreign is not None:
+            raise AskedWrongly(f"{foreign!r} is on no line of these units", "write ASCII, or bytes with send")
         line = self._cell.wiring.line_of[self._cell.unit(unit)]
         if line >= 0:
             self._refuse_a_long_queue(line, len(self._cell.serial_unit(unit).frame(text)))

@@ -99,7 +99,7 @@ class Service:
             self.reports += self.cell.wiring.remarks
             self._observed = observed
             if observed:
-                _watch(self.cell, passes_on=real is not None)
+                observe(self.cell, passes_on=real is not None)
             if opened is not None and stores is not None:
                 self.driven = opened.drive(self.cell, stores)
                 opening.callback(opened.end, self.driven)
@@ -266,7 +266,7 @@ def models(description: Description) -> dict[str, str]:
     return {name: unit.model for name, unit in description.units.items()}
 
 
-def _watch(cell: Cell, *, passes_on: bool) -> Watch:
+def observe(cell: Cell, *, passes_on: bool) -> Watch:
     """A watch in the place of the recording of `cell`. The past is not kept, and of the journal what is recent."""
     watch = Watch(cell, passes_on=passes_on)
     cell.recording, cell.journal = watch, RecentLog()

@@ -41,11 +41,15 @@ class _Waiter(NamedTuple):
 
 
 class Watched:
-    """The cell as the loop serves it. It stands when its pace is held, also in the middle of catching up."""
+    """The cell as the loop serves it. It stands when its pace is held, also in the middle of catching up.
 
-    def __init__(self, cell: Served, pace: Pace) -> None:
-        self.cell, self._pace = cell, pace
+    Nothing is looked at while it is not `present`: then it shows what was.
+    """
+
+    def __init__(self, cell: Served, pace: Pace, present: Callable[[], bool] = lambda: True) -> None:
+        self.cell, self._pace, self._present = cell, pace, present
         self._waiters: list[_Waiter] = []
+        self.lost: Callable[[], Answer] = lambda: {"reached": False}  # the answer where what is waited for is no more
 
     @property
     def now(self) -> Ns:
@@ -90,22 +94,22 @@ class Watched:
                 future.set_exception(error)
 
         waiter = _Waiter(conditions, tell, future)
-        if not waiter.over():
+        if not (self._present() and waiter.over()):
             # those who wait no longer go now: a cell that stands is not looked at
             self._waiters = [*(other for other in self._waiters if not other.future.cancelled()), waiter]
         return future
 
     def look(self) -> None:
         """Look at everything that is waited for."""
-        if self._waiters:
+        if self._waiters and self._present():
             self._waiters = [waiter for waiter in self._waiters if not waiter.over()]
 
-    def give_up(self, answer: Callable[[], Answer]) -> None:
+    def give_up(self) -> None:
         """What is waited for is no more: everybody is told so."""
         waiters, self._waiters = self._waiters, []
         for waiter in waiters:
             if waiter.future.set_running_or_notify_cancel():
-                waiter.future.set_result(answer())
+                waiter.future.set_result(self.lost())
 
     def close(self) -> None:
         """Nobody needs to wait any longer."""
@@ -114,9 +118,7 @@ class Watched:
         self._waiters = []
 
 
-def at_position(
-    now: Callable[[], Cell], watch: Callable[[], Watch], unit: str, axis: str, position: int
-) -> Condition:
+def at_position(now: Callable[[], Cell], watch: Callable[[], Watch], unit: str, axis: str, position: int) -> Condition:
     """The axis of a unit is at a position. The pulse that brings it there is an instant to look at."""
 
     def holds() -> bool:

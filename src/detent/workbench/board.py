@@ -1,6 +1,6 @@
 """The state of a cell as the table that windows show (see `live`), and the actions that windows may do to it.
 
-Keys: ``now begin end pace held why past faster late dropped marks crashed title queue turneddown faults branches``; of
+Keys: ``now begin end pace held why past faster late dropped marks crashed title queue control faults branches``; of
 real pins ``real`` (driven, fault, None) ``realwhy slips``; for each unit ``u.UNIT.`` and
 ``powered state address running error errorat hand reg unsaved stored memory pin.PIN x.AXIS.position|shaft|pulses|rate``
 (a single axis has no name: ``x..position``); for each switch ``s.SWITCH.`` and ``level low high``; for each motor
@@ -19,7 +19,7 @@ from detent.pins import Level
 from detent.ticks import MS, Ns
 from detent.workbench.live import Live, Value
 from detent.workbench.messages import Mark, State, UnitState
-from detent.workbench.waiting import Waiting
+from detent.workbench.words import check_typed
 
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
@@ -46,6 +46,7 @@ class Board:
         """Show what the bench knows now."""
         bench = self._bench
         values = table(bench.state)
+        values["control"] = bench.control_url
         values["crashed"], values["title"] = bench.crashed, bench.picture.title or bench.picture.target
         marks = bench.state.marks
         known = (len(marks), marks[0] if marks else None, marks[-1] if marks else None)
@@ -70,6 +71,7 @@ def table(state: State) -> dict[str, Value]:
         "dropped": state.dropped,
         "breakerrors": state.break_on_errors,
         "branches": [list(branch) for branch in state.branches],
+        "queue": [list(one) for one in state.queue],
         "faults": [[number, text] for number, text in state.faults.items()],
         "real": None if state.real is None else state.real.standing,
         "realwhy": None if state.real is None else state.real.why,
@@ -109,7 +111,6 @@ def _unit(values: dict[str, Value], key: str, unit: UnitState) -> None:
 
 def _offer(bench: "Bench", live: Live) -> None:
     """What a window may do to the cell."""
-    waiting = Waiting(bench, live)
     turning = asyncio.Lock()  # a notch is counted from where the one before has come to
 
     async def pace(times: Annotated[float, Field(ge=1e-6, le=1e6)] | None) -> None:
@@ -131,7 +132,6 @@ def _offer(bench: "Bench", live: Live) -> None:
         await notch(-1)
 
     async def step_instruction(unit: str) -> None:
-        await waiting.out()
         await bench.step_instruction(unit)
 
     async def step_back(unit: str | None = None) -> None:
@@ -160,14 +160,14 @@ def _offer(bench: "Bench", live: Live) -> None:
         foreign = next((character for character in data if ord(character) > 0xFF), None)
         if foreign is not None:
             raise ValueError(f"{foreign!r} is no byte: write what cannot be typed as \\xHH")
-        await waiting.send(line, data.encode("latin-1"))
+        await bench.queue_send(line, data.encode("latin-1"))
 
     async def type(unit: str, text: Text) -> None:
-        await waiting.type(unit, text)
+        await bench.queue_type(unit, check_typed(text))
 
     async def withdraw(number: int | None = None) -> None:
         """Take back what waits: one, or all of it."""
-        waiting.withdraw(number)
+        await bench.withdraw(number)
 
     async def start(unit: str) -> None:
         await bench.start(unit)
@@ -179,11 +179,9 @@ def _offer(bench: "Bench", live: Live) -> None:
         await bench.hold()
 
     async def go() -> None:
-        await waiting.out()
         await bench.go()
 
     async def step_event() -> None:
-        await waiting.out()
         await bench.step_event()
 
     async def breaks(where: Text, kind: Text, given: dict[str, str | float] | None = None) -> int:

@@ -12,6 +12,7 @@ from asyncio.subprocess import Process
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from detent.cell.description import Problem
 from detent.cell.moments import Cut
@@ -19,6 +20,7 @@ from detent.outputs.signals import Signals
 from detent.pins import Level
 from detent.realtime.cell_source import find_cell
 from detent.realtime.endpoints.spec import EndpointSpec
+from detent.realtime.endpoints.tcp import TcpAddress
 from detent.ticks import SECOND, Ns
 from detent.workbench import exports, joining
 from detent.workbench.messages import (
@@ -67,6 +69,8 @@ class Bench:
     """Why the engine is gone, in a line; None while it lives. `revive` starts it anew."""
     sources: Mapping[str, str]
     """The texts of the programs that the cell file names, by unit."""
+    control_url: str | None
+    """Where programs look at the cell and meddle with it; None if nowhere."""
     cut: int
     """How often the past was changed: what was drawn from `scope` or `terminal` before is no longer true."""
 
@@ -84,16 +88,18 @@ class Bench:
         held: bool = False,
         real: bool = False,
         memory: int = 512,
+        control: TcpAddress | None = None,
+        token: str | None = None,
     ) -> "Bench":
         """Start the engine for `target`, a model or a cell file, and wait until it serves.
 
         `straps` and `options` are written as for `serve` (PIN=LEVEL or UNIT.PIN=LEVEL). `endpoints`: of every
         line; none: what the cell file says, or a pty. `state_dir` keeps EEPROM images. `real` drives the pins of its
-        boards. The past that is kept takes about `memory` MB; what is older is dropped. Raises Problem if it was asked
-        wrongly, BenchError if it failed.
+        boards. The past that is kept takes about `memory` MB; what is older is dropped. At `control` programs look and
+        meddle (`control_url`) that know the `token`. Raises Problem if it was asked wrongly, BenchError if it failed.
         """
         order = Order(target, tuple(straps), tuple(options), tuple(endpoints), pace, line_timing, state_dir, held)
-        bench = cls(order._replace(memory=memory, real=real))
+        bench = cls(order._replace(memory=memory, real=real, control=control, token=token))
         try:
             await bench._start(bench._order)
         except BaseException:
@@ -198,8 +204,11 @@ class Bench:
             case Cut():
                 self._mirror.cut(message)
                 self.cut += 1
-            case Opened(picture, sources, _):
-                self.picture, self.sources = picture, sources
+            case Opened(picture, sources, _, url):
+                self.picture, self.sources, self.control_url = picture, sources, url
+                if url is not None and self._order.control is not None:  # an engine after this one is found there, too
+                    port = urlsplit(url).port or 0
+                    self._order = self._order._replace(control=self._order.control._replace(port=port))
                 self._mirror, self._marks = Mirror(message), ()
                 self._scope = Scope(picture, self._mirror)
                 self._talks = Talks(picture, self._mirror)
@@ -372,6 +381,18 @@ class Bench:
         """The host of a unit sends it a command line; address, checksum and end are added."""
         await self._ask("type", unit, text)
 
+    async def queue_send(self, line: str, data: bytes) -> None:
+        """The same as `send`; while the cell stands it waits (`state.queue`) until time goes on."""
+        await self._ask("queue_send", line, data)
+
+    async def queue_type(self, unit: str, text: str) -> None:
+        """The same as `type`; while the cell stands it waits until time goes on."""
+        await self._ask("queue_type", unit, text)
+
+    async def withdraw(self, number: int | None = None) -> None:
+        """Take back what waits: one, or all of it."""
+        await self._ask("withdraw", number)
+
     async def load(self, unit: str, image: bytes, base: int) -> None:
         """Put a program into program memory (`Program.check`: image and base)."""
         await self._ask("load", unit, image, base)
@@ -456,7 +477,8 @@ class Bench:
         for spec in (one for several in placed.values() for one in several):
             if spec.kind == "pty" and spec.where and Path(spec.where).is_symlink():
                 Path(spec.where).unlink()  # of the one that is gone; its terminal may be another's by now
-        await self._start(self._order._replace(actions=actions, until=until, held=True, placed=placed))
+        queue = self.state.queue
+        await self._start(self._order._replace(actions=actions, until=until, held=True, placed=placed, queue=queue))
         self.crashed = None
         self._call_back()
 
@@ -482,7 +504,7 @@ class Bench:
             self._closing = False
             await self._start(before)
             raise
-        self._order = order
+        self._order = order._replace(control=self._order.control)
         self._call_back()
 
     # -- looking at what happened --------------------------------------------------------------------------

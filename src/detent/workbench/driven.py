@@ -19,18 +19,20 @@ from detent.cell.outside import no_store
 from detent.cell.stores import Stores
 from detent.outputs.units import views
 from detent.realtime.boards.drive import Opened, RealPins
+from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.leaving import CERTAIN
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.states import News, Standing, Weight
 from detent.realtime.cell_source import CellSource
 from detent.realtime.loop import Companion, ServedLine, stopped_by_signals, wake_exactly
 from detent.realtime.pace import Pace, WallNs
-from detent.realtime.service import build_with_images
+from detent.realtime.service import build_with_images, observe
 from detent.ticks import MS, Ns
 from detent.uart import Chars
 from detent.workbench import rotors
 from detent.workbench.engine import Engine
-from detent.workbench.messages import Mark, RealState, State
+from detent.workbench.marks import Marks
+from detent.workbench.messages import RealState, State
 
 EVERY: WallNs = 20 * MS  # between two looks at what is certain by now
 SLICE: Ns = 5 * MS  # of the second cell, lived in one go
@@ -48,8 +50,7 @@ class DrivenEngine(Engine):
 
     def _begin(self, found: CellSource) -> Cell:
         self._found, self._reports = found, list[str]()
-        self._marks: list[Mark] = []
-        self._told_marks: tuple[Mark, ...] = ()
+        self._marks = Marks()
         self._shown: set[int] = set()
         described, read, images = found.description, found.read, self._images
         self._boards = opened = Opened(described, read, RealPins(self._news))
@@ -60,6 +61,8 @@ class DrivenEngine(Engine):
         real = build_with_images(
             described, read, images, line_timing, self._reports, True, stores.save, opened.inputs
         )  # fmt: skip
+        if self._order.control is not None:
+            observe(real, passes_on=True)
         self._stores = Stores()
         cell = self._alike(found, line_timing)
         self._driven = opened.drive(real, stores)
@@ -98,6 +101,7 @@ class DrivenEngine(Engine):
     def run(self) -> None:
         """Serve until the workbench leaves; from here on pulses leave. Raises EndpointLost."""
         wake_exactly()
+        self._tell_all()
         self._boards.begin(self._driven, self._pace)
         with stopped_by_signals(self._loop):
             self._loop.run()
@@ -184,7 +188,7 @@ class DrivenEngine(Engine):
 
     def _news(self, news: News) -> None:
         kind = "action" if news.weight is Weight.NOTE else "error"
-        self._marks.append(Mark(news.at, kind, "", news.text))
+        self._marks.put(news.at, kind, news.text)
         self._quiet = False
 
     def _stopped(self) -> None:
@@ -256,16 +260,33 @@ class DrivenEngine(Engine):
         if factor != 1:
             raise ValueError(NOT_REAL)
 
-    def _do(self, action: Action, unit: str = "", text: str = "") -> None:
+    def do(self, action: Action) -> None:
+        """Do it to the machine's cell, now, unless its past is looked at."""
         if self.history.past or self.history.stopped:
             raise ValueError("you are looking back: go to the present first, where the machine is")
         if isinstance(action, (SetPin, Release)) and (action.unit, action.pin) in self._boards.inputs:
             raise ValueError(f"{action.unit}.{action.pin} is an input of a board; its level is that of the pin")
+        self.do_there(action)
+
+    def do_there(self, action: Action) -> None:
+        """Do it to the machine's cell, now, whatever is looked at."""
         self._driven.cell.do(action)
         self._driven.run_to(self._driven.now)
+        self._marks.deed(self._driven.cell, action)
         self._quiet = False
-        if text:
-            self._marks.append(Mark(self.now, "action", unit, text))
+
+    def _sends_now(self) -> bool:
+        """A machine's time always goes on: what is typed while somebody looks back must not move it later."""
+        return True
+
+    def _is_present(self) -> bool:
+        """It is the machine that one waits for."""
+        return True
+
+    @property
+    def driven(self) -> Driven:
+        """The machine's cell behind its pins."""
+        return self._driven
 
     _VERBS: ClassVar[dict[str, Callable[..., object]]] = {
         **Engine._VERBS,  # noqa: SLF001 (of its own kind)

@@ -8,8 +8,9 @@ import gc
 import socket
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import ClassVar, Final, TypeVar
 
 from detent.assembler import ImageError
 from detent.cell.actions import (
@@ -32,7 +33,6 @@ from detent.cell.history import Broken, History
 from detent.cell.recording import Entry
 from detent.cell.stores import Stores
 from detent.controllers import catalogue
-from detent.controllers.device import Cautioned, Powered, Refused, StoreImage
 from detent.lines.line import Line
 from detent.outputs.units import views
 from detent.pins import Level
@@ -47,17 +47,18 @@ from detent.realtime.pace import Lateness as Counted
 from detent.realtime.pace import Pace, WallNs
 from detent.realtime.service import build_with_images, models, open_endpoints
 from detent.realtime.verbs import VERBS
+from detent.realtime.waiting import Watched
+from detent.realtime.watch import Watch
 from detent.ticks import SECOND, Ns
 from detent.uart import Chars
 from detent.workbench import look, rotors
+from detent.workbench.marks import Marks
 from detent.workbench.messages import (
-    MOST_MARKS,
     Answer,
     Ask,
     Failed,
     Happened,
     Lateness,
-    Mark,
     Marked,
     Opened,
     Order,
@@ -67,11 +68,14 @@ from detent.workbench.messages import (
 )
 from detent.workbench.mirror import SLACK
 from detent.workbench.pipe import Pipe
+from detent.workbench.waiting import Waiting, Waits
 
 BASE: Final = 210  # MB of both processes before anything has happened
 BATCH: Final = 480  # bytes that a batch of the recording takes, measured on the drilling cell
 LEAST_KEPT: Final = 20_000  # batches, however little memory there may be
 BY_HAND = "by hand"
+BY_PROGRAM = "by a program"  # that controls it
+T = TypeVar("T")
 WRONG = (Problem, Broken, ImageError, ValueError, KeyError, TypeError)  # of whoever asks
 
 
@@ -91,6 +95,8 @@ class Engine:
         self._faster = 0.0
         self._lateness = Lateness(0, 0, 0)
         self._quiet = False  # nothing has changed since it was last told
+        self.waiting = Waiting(order.queue)
+        self.control: str | None = None  # the URL of who looks and meddles
         self._cleanup = contextlib.ExitStack()
         with contextlib.ExitStack() as opening:
             found = self._find()
@@ -111,16 +117,16 @@ class Engine:
             self._pipe = Pipe(end, self._heed, self._tick, lambda: self._loop.stop())
             opening.callback(self._pipe.close)
             self._pace = self._made_pace()
-            self._set_pace(order.pace)
+            self.change_pace(order.pace)
             endpoints: list[tuple[int, Endpoint]] = [(0, self._pipe), *self._opened]  # what is asked comes first
             patience = [line.format.duration(BEHIND) for line in cell.lines]
-            self._loop = Loop(self, self._pace, endpoints, patience=patience, companion=self._companion())
+            self.watched = Watched(self, self._pace, self._is_present)
+            self._loop = Loop(self.watched, self._pace, endpoints, patience=patience, companion=self._companion())
             opening.callback(self._loop.close)
             self._again()
             if order.held or order.actions:
                 self.hold()
             self._cleanup = opening.pop_all()
-        self._tell_all()
 
     # -- made anew ---------------------------------------------------------------------------------------
 
@@ -151,14 +157,15 @@ class Engine:
         cell = build_with_images(
             found.description, found.read, self._images, line_timing, self._reports, True, self._stores.save
         )
+        if self._order.control is not None:
+            cell.recording = Watch(cell, passes_on=True)  # for who asks how units stand; copies take theirs along
         shafts = {name: unit.shaft for name, unit in found.description.units.items()}
         self.history = History(cell, self._stores, shafts=shafts, on_stop=self._stopped, keep=keep(self._order.memory))
         self.history.on_notable = self._mark_entry
         for part in self.history.motors:
             rotors.prepare(cell, part)
         self._views = views(cell, shafts)
-        self._marks: list[Mark] = []
-        self._told_marks: tuple[Mark, ...] = ()
+        self._marks = Marks()
         self._shown: set[int] = set()  # motors of which something was told
         return cell
 
@@ -172,6 +179,10 @@ class Engine:
 
     def _made_pace(self) -> Pace:
         return Pace(self._order.pace or 1, origin=0)
+
+    def _is_present(self) -> bool:
+        """Whether the cell stands where it has come to."""
+        return not self.history.past
 
     def _companion(self) -> Companion | None:
         """What is served beside the cell."""
@@ -191,7 +202,7 @@ class Engine:
 
     def _tell_all(self) -> None:
         description, read = self._found.description, self._found.read
-        self._pipe.push(Opened(self._picture(), look.sources(description, read), self._views))
+        self._pipe.push(Opened(self._picture(), look.sources(description, read), self._views, self.control))
         self._tell()
 
     # -- as it is served ---------------------------------------------------------------------------------
@@ -219,9 +230,28 @@ class Engine:
         self.history.send(line, data)
         self._quiet = False
 
+    @property
+    def description(self) -> Description:
+        """What the cell was built from."""
+        return self._found.description
+
+    @property
+    def pacing(self) -> Pace:
+        """The clock."""
+        return self._pace
+
+    def addresses(self) -> list[tuple[int, str, str]]:
+        """Each endpoint: the number of its line, its kind, and what a client connects to."""
+        return [(line, endpoint.kind, endpoint.address) for line, endpoint in self._opened]
+
+    def ask(self, function: Callable[[], T]) -> "Future[T]":
+        """Call `function` soon on the thread that serves; from any thread."""
+        return self._loop.ask(function)
+
     def run(self) -> None:
         """Serve until the workbench leaves. Raises EndpointLost."""
         wake_exactly()
+        self._tell_all()
         gc.freeze()  # what is there now stays: no collection shall look at it while a deadline waits
         self._pace.restart(self.now)
         with stopped_by_signals(self._loop):
@@ -265,15 +295,12 @@ class Engine:
                     found[history.cell.wiring.names[part]] = rows
         news = history.news()
         if news.cut is not None:
-            at = news.cut.at
-            self._marks = [mark for mark in self._marks if mark.at <= at]
+            self._marks.cut(news.cut.at)
             self._pipe.push(news.cut)
         if news.batches or news.actions or found:
             self._pipe.push(Happened(news.first, news.batches, news.actions, found, history.first_batch))
-        begin = history.begin
-        marks = tuple(mark for mark in self._marks if mark.at >= begin)[-MOST_MARKS:]
-        if marks != self._told_marks:
-            self._marks, self._told_marks = list(marks), marks
+        marks = self._marks.news(history.begin)
+        if marks is not None:
             self._pipe.push(Marked(marks))
         self._pipe.push(self._state())
         self._quiet = True
@@ -305,6 +332,7 @@ class Engine:
             dropped=sum(endpoint.dropped for _, endpoint in self._opened),
             faster=self._faster,
             real=self._real_state(),
+            queue=self.waiting.queue,
         )
 
     def _named_lines(self) -> list[tuple[str, Line]]:
@@ -312,21 +340,13 @@ class Engine:
         return list(zip(cell.wiring.line_names, cell.lines, strict=True))
 
     def _mark_entry(self, unit: int, entry: Entry) -> None:
-        name = self.history.cell.wiring.names[unit]
-        if isinstance(entry, Refused):
-            self._marks.append(Mark(entry.at, "error", name, f"{entry.frame}: {entry.reason}"))
-        elif isinstance(entry, Cautioned):
-            self._marks.append(Mark(entry.at, "caution", name, f"{entry.frame}: {entry.what}"))
-        elif isinstance(entry, Powered) and entry.at:
-            self._marks.append(Mark(entry.at, "power", name, "on" if entry.on else "off"))
-        elif isinstance(entry, StoreImage):
-            self._marks.append(Mark(entry.at, "stored", name, f"{len(entry.image)} bytes kept"))
+        self._marks.entry(self.history.cell.wiring.names[unit], entry)
 
     def _stopped(self) -> None:
         """The cell stands: so does the clock."""
         why = self.history.stopped
-        if why != BY_HAND:
-            self._marks.append(Mark(self.now, "breakpoint", "", why))
+        if why not in (BY_HAND, BY_PROGRAM):
+            self._marks.put(self.now, "breakpoint", why)
         self._pace.hold(self.now)
         self._quiet = False
 
@@ -338,15 +358,18 @@ class Engine:
 
     def go(self) -> None:
         """It goes on."""
+        self.send_waiting()
         self.history.go()
         self._pace.go(self.now)
 
-    def _set_pace(self, factor: float | None) -> None:
+    def change_pace(self, factor: float | None) -> None:
+        """So many times as fast as real time; None: as fast as it goes."""
         self._pace.change(factor, self.now)
         self._pace.lateness = Counted()
 
     def step_event(self) -> None:
         """The next event."""
+        self.send_waiting()
         self._stand()
         if not self.history.step():
             self.history.stopped = "nothing more happens by itself"
@@ -367,6 +390,7 @@ class Engine:
     def step_instruction(self, unit: str) -> None:
         """The next instruction of a unit."""
         index = self.history.cell.unit(unit)
+        self.send_waiting()
         self._stand()
         why = self.history.step_instruction(index)
         if why:
@@ -415,13 +439,13 @@ class Engine:
 
     def power(self, unit: str, on: bool) -> None:
         """Switch a supply; it is marked when it happens."""
-        self._do(Power(unit, on))
+        self.do(Power(unit, on))
 
     def set_switch(self, name: str, level: Level) -> None:
         """Put a switch to a level."""
         if name not in self.history.cell.wiring.names[self.history.cell.wiring.units :]:
             raise catalogue.unknown("switch", name, tuple(look.switches(self.history)))
-        self._do(SetSwitch(name, level), "", f"{name} to {level}")
+        self.do(SetSwitch(name, level))
 
     def set_pin(self, unit: str, pin: str, level: Level | None) -> None:
         """Hold a wire to an input, or take it away."""
@@ -431,33 +455,32 @@ class Engine:
         if pin not in known:
             raise catalogue.unknown(f"input of {unit}", pin, known)
         if level is None:
-            self._do(Release(unit, pin), unit, f"{pin} released")
+            self.do(Release(unit, pin))
         else:
-            self._do(SetPin(unit, pin, level), unit, f"{pin} to {level}")
+            self.do(SetPin(unit, pin, level))
 
     def place_switch(self, name: str, low: float | None, high: float | None) -> None:
         """Put a switch elsewhere on its axis."""
-        ends = " to ".join("..." if place is None else f"{place:g}" for place in (low, high))
-        self._do(PlaceSwitch(name, low, high), "", f"{name} at {ends}")
+        self.do(PlaceSwitch(name, low, high))
 
     def send_line(self, line: str, data: bytes) -> None:
         """The host of a line sends."""
         names = self.history.cell.wiring.line_names
         if line not in names:
             raise catalogue.unknown("line", line, names)
-        self._do(Send(names.index(line), data))
+        self.do(Send(names.index(line), data))
 
     def type(self, unit: str, text: str) -> None:
         """The host of a unit sends it a command line."""
-        self._do(Type(unit, text))
+        self.do(Type(unit, text))
 
     def load(self, unit: str, image: bytes, base: int) -> None:
         """Put a program into memory."""
-        self._do(Load(unit, image, base), unit, f"{len(image)} bytes loaded")
+        self.do(Load(unit, image, base))
 
     def start(self, unit: str) -> None:
         """Start the program in memory."""
-        self._do(Start(unit), unit, "started")
+        self.do(Start(unit))
 
     def save(self, unit: str) -> int:
         """Send the unit its own command that keeps its program; how often it had written before."""
@@ -466,7 +489,7 @@ class Engine:
         if not command:
             raise ValueError(f"{unit} has no memory that lasts without supply")
         written = self.history.panel.fronts[index].stored
-        self._do(Type(unit, command))
+        self.do(Type(unit, command))
         return written
 
     def read_back(self, unit: str, kept: bool) -> bytes:
@@ -480,13 +503,13 @@ class Engine:
         lasting = found.get("for")
         assert lasting is None or isinstance(lasting, int)
         fault = breaking.meant(Names(self.history.cell), found)
-        self._do(Break(fault, lasting), "", f"{found['kind']} at {found['where']}")
+        self.do(Break(fault, lasting))
         return self.history.cell.faults.last
 
     def mend(self, number: int | None) -> None:
         """A fault is mended; all of them without a number."""
         for one in list(self.history.cell.faults.standing) if number is None else [number]:
-            self._do(Mend(one), "", f"fault {one} mended")
+            self.do(Mend(one))
 
     def restart(self) -> None:
         """Begin anew from the cell file. ValueError if its lines are others now."""
@@ -503,14 +526,61 @@ class Engine:
         if standing:
             self.hold()
         self._tell_all()
+        self.watched.give_up()
 
-    def _do(self, action: Action, unit: str = "", text: str = "") -> None:
+    def do(self, action: Action) -> None:
+        """Do it, now; what does not show itself gets its mark. Raises what `History.do` does."""
         self.history.do(action)
+        self._marks.deed(self.history.cell, action)
         self._quiet = False
-        if text:
-            self._marks.append(Mark(self.now, "action", unit, text))
         if self._pace.held:
             self._pace.hold(self.now)
+
+    # -- verbs: what is sent while it stands -----------------------------------------------------------
+
+    def _sends_now(self) -> bool:
+        return not self._pace.held
+
+    def queue_type(self, unit: str, text: str) -> None:
+        """Send a unit a command line, or keep it until time goes on."""
+        if self._sends_now():
+            self.type(unit, text)
+            return
+        cell = self.history.cell
+        line = cell.hosted_line(unit)
+        cell.serial_unit(unit).frame(text)  # what it does not take is said now
+        self.waiting.put(cell.wiring.line_names[line], unit, text)
+        self._quiet = False
+
+    def queue_send(self, line: str, data: bytes) -> None:
+        """Send bytes to a line, or keep them until time goes on."""
+        if self._sends_now():
+            self.send_line(line, data)
+            return
+        names = self.history.cell.wiring.line_names
+        if line not in names:
+            raise catalogue.unknown("line", line, names)
+        self.waiting.put(line, None, data.decode("latin-1"))
+        self._quiet = False
+
+    def withdraw(self, number: int | None) -> None:
+        """Take back what waits: one, or all of it."""
+        self.waiting.withdraw(number)
+        self._quiet = False
+
+    def send_waiting(self) -> None:
+        """What has waited goes out; what is refused is raised, and what is behind it stays."""
+        self.waiting.out(self._send)
+
+    def _send(self, one: Waits) -> None:
+        if one.unit is None:
+            self.send_line(one.line, one.text.encode("latin-1"))
+        else:
+            self.type(one.unit, one.text)
+
+    def refuse(self, error: Exception) -> None:
+        """Tell the workbench that it was asked wrongly."""
+        self._pipe.push(Failed(str(error), "", asked_wrongly=True))
 
     def fail(self, error: Exception) -> None:
         """Tell the workbench why there is an end."""
@@ -523,6 +593,6 @@ class Engine:
                      set_breakpoint,
                      take_branch, compare_branch,
                      set_break_on_errors, power, set_switch, set_pin, place_switch, send_line, type, load, start, save,
-                     breaks, mend,
+                     breaks, mend, queue_type, queue_send, withdraw,
                      read_back, restart)
-    } | {"pace": _set_pace}  # fmt: skip
+    } | {"pace": change_pace}  # fmt: skip

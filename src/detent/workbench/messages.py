@@ -14,7 +14,9 @@ from detent.motors.rotor import Floats
 from detent.outputs.units import UnitView
 from detent.pins import Level
 from detent.realtime.endpoints.spec import EndpointSpec
+from detent.realtime.endpoints.tcp import TcpAddress
 from detent.ticks import Ns
+from detent.workbench.waiting import Waits
 
 # -- the picture: what there is to draw -------------------------------------------------------------------------
 
@@ -234,6 +236,7 @@ class State(NamedTuple):
     dropped: int  # bytes that hosts did not read
     faster: float  # cell time per wall time, measured over the last second
     real: RealState | None = None  # of boards that are driven
+    queue: tuple[Waits, ...] = ()  # what is sent when time goes on
 
     @property
     def past(self) -> bool:
@@ -262,6 +265,9 @@ class Order(NamedTuple):
     memory: int = 512  # MB, about, that everything may take: what is older than fits is dropped
     placed: Mapping[str, tuple[EndpointSpec, ...]] = {}  # where its lines were served, by name
     real: bool = False  # drive the pins of the boards in the cell file
+    queue: tuple[Waits, ...] = ()  # what waited to be sent
+    control: TcpAddress | None = None  # where programs look and meddle; port 0: any that is free
+    token: str | None = None  # that they have to know
 
 
 class Ask(NamedTuple):
@@ -286,6 +292,7 @@ class Opened(NamedTuple):
     picture: Picture
     sources: Mapping[str, str]  # the texts of the programs that the cell file names, by unit
     views: Sequence[UnitView]
+    control: str | None = None  # the URL of who looks and meddles
 
 
 class Happened(NamedTuple):

@@ -3,12 +3,15 @@
 `Bench.open` starts it (`joining`).
 """
 
+import contextlib
 import pickle
 import socket
 import sys
+from contextlib import AbstractContextManager
 
 from detent.cell.description import Problem
 from detent.realtime.endpoints.endpoint import EndpointError
+from detent.realtime.endpoints.tcp import TcpAddress
 from detent.realtime.images import ImagesUnusable
 from detent.realtime.polling import allow_many
 from detent.workbench.engine import Engine
@@ -23,6 +26,12 @@ def _engine(end: socket.socket, order: Order) -> Engine:
     from detent.workbench.driven import DrivenEngine
 
     return DrivenEngine(end, order)
+
+
+def _controlled(engine: Engine, address: TcpAddress, token: str | None) -> AbstractContextManager[str]:
+    from detent.workbench.governed import controlled  # only for who asks
+
+    return controlled(engine, address, token)
 
 
 def _read_order(end: socket.socket) -> Order | None:
@@ -43,7 +52,13 @@ def main(words: list[str]) -> int:
     if order is None:
         return 0
     try:
-        with _engine(end, order) as engine:
+        with _engine(end, order) as engine, contextlib.ExitStack() as beside:
+            if order.control is not None:
+                try:
+                    engine.control = beside.enter_context(_controlled(engine, order.control, order.token))
+                except EndpointError as error:
+                    engine.refuse(error)
+                    return 2
             try:
                 engine.run()
             except Exception as error:

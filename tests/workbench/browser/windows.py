@@ -28,6 +28,7 @@ class Served(NamedTuple):
     folder: Path  # the chosen one
     state: Path
     process: subprocess.Popen[str]
+    control: str | None = None  # where programs look and meddle
 
 
 @contextmanager
@@ -42,7 +43,7 @@ def served(place: Path, *arguments: str) -> Iterator[Served]:
         line = process.stdout.readline()
         assert line, process.communicate()[1]
         facts = json.loads(line)
-        yield Served(facts["url"], facts["endpoints"], folder, state, process)
+        yield Served(facts["url"], facts["endpoints"], folder, state, process, facts["control"])
     finally:
         process.terminate()
         try:

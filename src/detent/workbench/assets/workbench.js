@@ -444,7 +444,6 @@ followTabs();
 on("real", (key, value) => {
   if (key === "real") document.documentElement.dataset.real = value ?? "";
 });
-on("turneddown", (key, value) => toast(value, "error")); // a command that had waited
 on("crashed", (key, value) => (document.documentElement.dataset.crashed = value ? "yes" : ""));
 on("title", (key, value) => {
   document.documentElement.dataset.title = value;

@@ -30,7 +30,7 @@ def build(bench: "Bench", window: Window) -> None:
 
     @ui.refreshable
     def drawing() -> None:
-        ui.html(markup(bench.picture), sanitize=False)
+        ui.html(markup(bench.picture, bench.control_url), sanitize=False)
 
     seen = bench.picture
 
@@ -44,8 +44,8 @@ def build(bench: "Bench", window: Window) -> None:
     window.each_state(look)
 
 
-def markup(picture: Picture) -> str:
-    """The whole cell as HTML bound to the live table."""
+def markup(picture: Picture, control: str | None = None) -> str:
+    """The whole cell as HTML bound to the live table; `control` is where programs do the same as hands."""
     jacks = {end for wire in picture.wires for end in (wire.source, *wire.targets)}
     panel = [switch for switch in picture.switches.values() if switch.axis is None]
     loose = [motor for motor in picture.motors.values() if motor.unit is None]
@@ -61,11 +61,11 @@ def markup(picture: Picture) -> str:
         f'<div class="cell{" with-panel" if panel else ""}" data-part="wires" data-wires="{escape(wires)}">'
         f'<svg class="wires" aria-hidden="true"></svg>{_panel(panel) if panel else ""}'
         f'<div class="units" style="--count:{max(1, count)}">{cards}</div></div>'
-        f"{_breaking(picture)}"
+        f"{_breaking(picture, control)}"
     )
 
 
-def _breaking(picture: Picture) -> str:
+def _breaking(picture: Picture, control: str | None) -> str:
     """What can break, and what is broken: the faults of the control API."""
     places = {
         "line": [line.name for line in picture.lines.values()],
@@ -78,6 +78,10 @@ def _breaking(picture: Picture) -> str:
     kinds = [[kind.name, kind.help, kind.takes, places[kind.where]] for kind in FAULTS.values()]
     helps = {parameter.name: parameter.help for parameter in VERBS["fault"].parameters}
     options = "".join(f'<option value="{escape(kind.name)}">{escape(kind.help)}</option>' for kind in FAULTS.values())
+    command = f"detent control {control}"
+    programs = f"""<p class="programs quiet">Programs look at this cell and meddle with it, too: <button type="button"
+ class="endpoint num" data-part="copy" data-copy="{escape(command)}" data-help="Without a word more it shows how
+everything stands; help lists what else it does. Click to copy">{escape(command)}</button></p>"""
     return f"""<section class="panel breaking" aria-label="Break it" data-part="breaking"
  data-kinds="{escape(json.dumps(kinds))}" data-helps="{escape(json.dumps(helps))}">
 <div class="panel-head"><h2>Break it</h2><span class="quiet grow">What a real cell does some day: every fault can be
@@ -87,7 +91,7 @@ mended, and taken back on the time line.</span></div>
 <label class="quiet">for <input class="field num" name="for" placeholder="until mended" aria-label="For how long"
  data-help="A time like 200 ms, or seconds; empty: until it is mended"></label>
 <button class="key primary">Break</button></form>
-<ul class="standing" aria-label="Faults that stand"></ul></section>"""
+<ul class="standing" aria-label="Faults that stand"></ul>{programs if control else ""}</section>"""
 
 
 def _panel(switches: Iterable[SwitchPicture]) -> str:
