@@ -62,8 +62,8 @@ def test_a_cell_is_the_same_with_its_tables() -> None:
             "hardware.slide.dir: pin gpio2 of left is hardware.slide.step already: take",
         ),
         ('"gpio18"', '"!gpio12"', "hardware.table.X.dir: pin gpio12 of left is hardware.slide.inputs.UI1 already"),
-        ('step = "!gpio2"', "", "hardware.slide: dir is of an axis that is driven: give step = 'PIN' too"),
-        ('dir = "gpio3"', "", "hardware.slide: dir is missing: the firmware needs a pin for it"),
+        ('step = "!gpio2"', "", "hardware.slide.dir: it is of an axis that is driven: give step = 'PIN' too"),
+        ('dir = "gpio3"', "", "hardware.slide.dir: this key is missing: the firmware needs a pin for it"),
         ('dir = "gpio3"', 'dir = "^gpio3"', "hardware.slide.dir: an output has no pull: leave out ^ and ~"),
         ('EOT = "^gpio10", ', "", "hardware.slide.inputs: slide has no EOT: wire it, inputs = { EOT = 'PIN' }, or say"),
         ('unwired = ["LY-", "LY+"]', "", "hardware.table.Y.inputs: table.Y has no LY-: wire it"),
@@ -90,22 +90,22 @@ def test_a_cell_is_the_same_with_its_tables() -> None:
             "hardware.slide.pulse: the pulses of a gs-c200 are 1.7 us long: no shorter",
         ),
         ('pulse = "5 us"', 'puls = "5 us"', "hardware.slide.puls: there is no such key; did you mean pulse?"),
-        ('lead = "20 ms"', 'lead = "1 ms"', "boards.left: lead is 3 to 500 ms; 30 ms do on every computer"),
+        ('lead = "20 ms"', 'lead = "1 ms"', "boards.left.lead: 3 to 500 ms; 30 ms do on every computer"),
         (
             'lead = "20 ms"',
             'lead = "8 ms"\nmargin = "4 ms"',
-            "boards.left: margin is 1 ms to a third of the lead, 2.67 ms",
+            "boards.left.margin: 1 ms to a third of the lead, 2.67 ms",
         ),
-        ('lead = "20 ms"', 'margin = "0 s"', "boards.left: margin is 1 ms to a third of the lead"),
-        ('lead = "20 ms"', 'watchdog = "50 ms"', "boards.left: watchdog is at least 200 ms here"),
+        ('lead = "20 ms"', 'margin = "0 s"', "boards.left.margin: 1 ms to a third of the lead"),
+        ('lead = "20 ms"', 'watchdog = "50 ms"', "boards.left.watchdog: at least 200 ms here"),
         ('error = "exact"', 'error = "1 s"', "boards.left.error: the error of a pulse is 'exact'"),
         (
             'kind = "tmc2209", uart = "gpio16", address = 0',
             'kind = "a4988"',
             "slide.driver.kind: it should be 'plain', 'tmc",
         ),
-        ('uart = "gpio16", address = 1', "address = 1", "hardware.table.X.driver: a tmc2209 is told by its UART"),
-        ('half = "gpio23"', "sense = 0.1", "hardware.table.Y.driver: a plain driver needs half = 'PIN'"),
+        ('uart = "gpio16", address = 1', "address = 1", "hardware.table.X.driver.uart: a tmc2209 is told by its UART"),
+        ('half = "gpio23"', "sense = 0.1", "hardware.table.Y.driver.half: a plain driver needs it, half = 'PIN'"),
         (
             'RST = "^gpio30"',
             'RST = "^gpio30", "LX-" = "gpio31"',
@@ -135,6 +135,24 @@ def test_what_cannot_be_is_one_line_with_file_key_and_remedy(old: str, new: str,
     assert error in str(raised.value)
     assert str(raised.value).startswith("cell.toml: ")
     assert "\n" not in str(raised.value)
+
+
+def test_no_device_is_two_things() -> None:
+    device = "/dev/serial/by-id/usb-Klipper_rp2040_E66160F423-if00"
+    two = GOOD.replace("[hardware.table]", f'[boards.right]\nserial = "{device}@250000"\n[hardware.table]')
+    cell(two)  # nothing hangs on it
+    with pytest.raises(Problem, match=f"boards.right.serial: {device} is boards.left.serial already: each has"):
+        cell(
+            two.replace('[hardware.slide]\nboard = "left"', '[hardware.slide]\nboard = "right"').replace(
+                "20 ms", "30 ms"
+            )
+        )
+    wire = GOOD.replace(
+        "[boards.left]", f'[lines.host]\nunits = ["slide"]\nendpoint = "serial:{device}"\n[boards.left]'
+    )
+    with pytest.raises(Problem, match=r"lines\.host\.endpoint: .* is boards.left.serial already"):
+        cell(wire)
+    cell(two.replace(device, "fake:").replace("@250000", ""))  # each its own fake
 
 
 def test_a_switch_on_another_board_stops_too_late() -> None:

@@ -47,6 +47,11 @@ def deaf(board: FakeBoard) -> FakePort:
     return FakePort(board)
 
 
+def aliased(_: FakeBoard) -> FakePort:
+    """Each pin has two names, as in the firmware's Linux process."""
+    return FakePort(FakeBoard(moves=400, pins={"chip0/gpio0": (0, 64), "gpio0": (0, 64)}))
+
+
 CASES: dict[str, tuple[Change, Callable[[FakeBoard], FakePort], str, str]] = {
     # what is wrong: what is different in the cell file, or on the board; the key; what the line says
     "no board": (("fake:", "/dev/serial/by-id/usb-Klipper_x"), FakePort, "boards.b.serial",
@@ -60,11 +65,15 @@ CASES: dict[str, tuple[Change, Callable[[FakeBoard], FakePort], str, str]] = {
     "a pin that the board needs itself": (("gpio6", "gpio1"), FakePort, "hardware.x.outputs.MOV", "gpio1"),
     "a pin used twice": (("gpio6", "gpio10"), FakePort, "hardware.x.inputs.EOT",
                          "pin gpio10 of b is hardware.x.outputs.MOV already: take another"),
+    "a pin used under two names": (("gpio6", "chip0/gpio3"), aliased, "hardware.x.outputs.MOV",
+                                   "chip0/gpio3 is the pin gpio3, which is taken by x.dir; use another"),
+    "a pin that the board needs, by its other name": (("gpio6", "chip0/gpio1"), aliased, "hardware.x.outputs.MOV",
+                                                      "the board needs chip0/gpio1 itself"),
     "what is no pin": (("^gpio10", "^^gpio10"), FakePort, "hardware.x.inputs.EOT", "write a pin of a board like gpio7"),
     "a driver that does not answer": (SAME, deaf, "hardware.x.driver",
                                       "the tmc2209 at gpio20, address 1 does not answer; look at its supply"),
     "a driver without its current": (("amperes = 0.8, ", ""), FakePort, "hardware.x.driver.amperes", "amperes = 0.8"),
-    "a driver that gives too little": (("amperes = 0.8", "amperes = 2.5"), FakePort, "hardware.x.driver.sense",
+    "a driver that gives too little": (("amperes = 0.8", "amperes = 1.9"), FakePort, "hardware.x.driver.sense",
                                        "take a smaller resistor"),
     "a driver without its microsteps": ((", microsteps = 2", ""), FakePort, "hardware.x.driver.microsteps",
                                         "microsteps = 2 for half steps"),
@@ -77,8 +86,8 @@ CASES: dict[str, tuple[Change, Callable[[FakeBoard], FakePort], str, str]] = {
     "an output that the unit has not": (("MOV =", "MOVE ="), FakePort, "hardware.x.outputs.MOVE", "did you mean MOV?"),
     "an input that the unit has not": (("HOME =", "HOM ="), FakePort, "hardware.x.inputs.HOM", "did you mean HOME?"),
     "a board that the file has not": (('board = "b"', 'board = "c"'), FakePort, "hardware.x.board", "'c'"),
-    "an axis without a direction": (('dir = "gpio3"\n', ""), FakePort, "hardware.x", "dir is missing"),
-    "a lead too short": (('serial = "fake:"', 'serial = "fake:"\nlead = "1 ms"'), FakePort, "boards.b", "30 ms do on"),
+    "an axis without a direction": (('dir = "gpio3"\n', ""), FakePort, "hardware.x.dir", "this key is missing"),
+    "a lead too short": (('"fake:"', '"fake:"\nlead = "1 ms"'), FakePort, "boards.b.lead", "30 ms do on"),
 }  # fmt: skip
 
 

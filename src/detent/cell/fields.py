@@ -11,6 +11,14 @@ MOST_STEPS = 10**15  # farther from 0 no axis stands, and no number of any other
 LONGEST_NAME = 64
 
 
+class KeyFault(ValueError):
+    """What is wrong with one key of a table, found when the whole table is looked at."""
+
+    def __init__(self, key: str, message: str) -> None:
+        super().__init__(message)
+        self.key = key
+
+
 def _level(value: object) -> Level:
     levels: dict[object, Level] = {"0": LOW, "low": LOW, "1": HIGH, "high": HIGH}
     text = str(value).strip().lower()
@@ -23,6 +31,12 @@ def _duration(value: object) -> Ns:
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise ValueError("write a time like 1.5 (seconds) or '400 us'")
     return parse_duration(value)
+
+
+def _no_flag(value: object) -> object:
+    if isinstance(value, bool):
+        raise ValueError("true and false are no numbers")
+    return value
 
 
 def _list(value: object) -> object:
@@ -41,8 +55,11 @@ def _name(value: str) -> str:
 
 
 Name = Annotated[str, AfterValidator(_name)]
-Steps = Annotated[int, Field(ge=-MOST_STEPS, le=MOST_STEPS)]
-Number = Annotated[float, Field(ge=-MOST_STEPS, le=MOST_STEPS)]
+NoFlag = BeforeValidator(_no_flag)
+"""Of a number: `true` is none, though Python takes it for 1."""
+Steps = Annotated[int, NoFlag, Field(ge=-MOST_STEPS, le=MOST_STEPS)]
+Number = Annotated[float, NoFlag, Field(ge=-MOST_STEPS, le=MOST_STEPS)]
+Flag = Annotated[bool, Field(strict=True)]
 LevelField = Annotated[Level, BeforeValidator(_level)]
 DurationField = Annotated[Ns, BeforeValidator(_duration)]
 Names = Annotated[list[str], BeforeValidator(_list)]

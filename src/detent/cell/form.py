@@ -13,6 +13,12 @@ from detent.cell import hardware, tables
 from detent.nearest import did_you_mean
 
 _TRIED = ("[key]", "constrained-int", "constrained-float", "int", "float", "str")  # no keys, but what was tried
+_WANTED = {  # pydantic's kinds of faults, in words of a cell file
+    "model_type": "a table", "model_attributes_type": "a table", "dict_type": "a table", "dataclass_type": "a table",
+    "int_type": "a whole number", "int_parsing": "a whole number", "int_from_float": "a whole number",
+    "float_type": "a number", "float_parsing": "a number", "string_type": "text in quotes", "list_type": "a list",
+    "bool_type": "true or false", "bool_parsing": "true or false",
+}  # fmt: skip
 _BARE = re.compile(r"[A-Za-z0-9_.$ -]{1,64}")
 _NAMES = {**vars(kinds), **vars(tables), **vars(hardware), "Annotated": Annotated, "BeforeValidator": BeforeValidator}
 
@@ -93,7 +99,7 @@ def _fault(kind: type[Any], item: Any) -> tuple[str, str]:
     """The key and the message of one of pydantic's errors."""
     path: list[str] = []
     for part in item["loc"]:
-        if part in _TRIED:
+        if part in _TRIED or (isinstance(part, str) and part.startswith("function-") and part.endswith("]")):
             continue
         if isinstance(part, int):
             path[-1] += f"[{part + 1}]"
@@ -107,5 +113,10 @@ def _fault(kind: type[Any], item: Any) -> tuple[str, str]:
         return key, f"there is no such key; {hint}there are: {', '.join(known)}"
     if item["type"] == "missing":
         return key, "this key is missing"
+    cause = item.get("ctx", {}).get("error")
+    if isinstance(cause, kinds.KeyFault):
+        return f"{key}.{cause.key}", str(cause)
+    wanted = _WANTED.get(item["type"])
     message = item["msg"].removeprefix("Value error, ").replace("Input should", "it should")
+    message = message if wanted is None else f"it should be {wanted}"
     return key, f"{message} (it is {_shown.repr(item['input'])})" if not isinstance(item["input"], dict) else message

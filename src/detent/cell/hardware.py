@@ -10,20 +10,25 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, model_validator
 
-from detent.cell.fields import STRICT, DurationField, Names, Number
+from detent.cell.fields import STRICT, DurationField, Flag, KeyFault, Names, NoFlag, Number
 from detent.ticks import MS, SECOND, US, Ns, parse_duration
 
 LEAST_LEAD: Ns = 3 * MS
 MOST_LEAD: Ns = SECOND // 2
 LEAST_MARGIN: Ns = 1 * MS
 LEAST_WATCHDOG: Ns = 200 * MS
-_PIN = re.compile(r"(?P<signs>[!^~ ]*)(?P<name>[^!^~\s]+)")
+_PIN = re.compile(r"(?P<signs>[!^~ ]*)(?P<name>[^!^~\s]{1,64})")
 
 
 def _signed(value: str) -> str:
     found = _PIN.fullmatch(value.strip())
     signs = found["signs"].replace(" ", "") if found else ""
-    if found is None or signs.count("!") > 1 or signs.count("^") + signs.count("~") > 1:
+    if (
+        found is None
+        or not found["name"].isprintable()
+        or signs.count("!") > 1
+        or signs.count("^") + signs.count("~") > 1
+    ):
         raise ValueError("write a pin of a board like gpio7, !gpio7 (active low) or ^gpio7 (pull-up)")
     return signs + found["name"]
 
@@ -74,16 +79,16 @@ class Board(_Table):
 
     @model_validator(mode="after")
     def _sane(self) -> "Board":
-        if not self.serial.strip():
-            raise ValueError("serial is the device of the board: ls /dev/serial/by-id shows those that are plugged in")
+        if not self.serial.strip() or not self.serial.isprintable():
+            raise KeyFault("serial", "the device of the board: ls /dev/serial/by-id shows those that are plugged in")
         if not LEAST_LEAD <= self.lead <= MOST_LEAD:
-            raise ValueError(f"lead is {LEAST_LEAD // MS} to {MOST_LEAD // MS} ms; 30 ms do on every computer")
+            raise KeyFault("lead", f"{LEAST_LEAD // MS} to {MOST_LEAD // MS} ms; 30 ms do on every computer")
         if self.margin is not None and not LEAST_MARGIN <= self.margin <= self.lead // 3:
-            raise ValueError(f"margin is {LEAST_MARGIN // MS} ms to a third of the lead, {self.lead // 3 / MS:.3g} ms "
-                             "here: leave it out, or take a longer lead")  # fmt: skip
+            most = f"{self.lead // 3 / MS:.3g} ms here: leave it out, or take a longer lead"
+            raise KeyFault("margin", f"{LEAST_MARGIN // MS} ms to a third of the lead, {most}")
         least = max(LEAST_WATCHDOG, 4 * self.lead)
         if self.watchdog < least:
-            raise ValueError(f"watchdog is at least {least // MS} ms here: a busy computer needs that")
+            raise KeyFault("watchdog", f"at least {least // MS} ms here: a busy computer needs that")
         return self
 
 
@@ -96,15 +101,15 @@ class Driver(_Table):
     """Plain: high while half of the current will do."""
     amperes: Annotated[Number, Field(gt=0)] | None = None
     """A: of a phase, for full power; the most that the chip is told, where the controller commands amperes."""
-    sense: Annotated[Number, Field(gt=0)] = 0.11
+    sense: Annotated[Number, Field(ge=0.005, le=5)] = 0.11
     """Ohm: the sense resistors."""
-    microsteps: Literal[1, 2, 4, 8, 16, 32, 64] | None = None
+    microsteps: Annotated[Literal[1, 2, 4, 8, 16, 32, 64], NoFlag] | None = None
     """Pulses a full step, under a controller that commands none."""
     uart: InPin | None = None
     """tmc2208, tmc2209: the pin of the UART."""
     transmit: OutPin | None = None
     """The pin that sends, where it is not that of `uart`."""
-    address: Annotated[int, Field(ge=0, le=3)] = 0
+    address: Annotated[int, NoFlag, Field(ge=0, le=3)] = 0
     """tmc2209: of several on one UART."""
     select: OutPin | None = None
     """tmc2130, tmc5160: the pin that selects the chip; `bus` goes with it, or `clock`, `mosi` and `miso`."""
@@ -116,28 +121,30 @@ class Driver(_Table):
     """SPI by three pins."""
     miso: InPin | None = None
     """SPI by three pins."""
-    quiet: bool = False
+    quiet: Flag = False
     """StealthChop instead of SpreadCycle."""
-    interpolate: bool = True
+    interpolate: Flag = True
     """The chip makes 256 microsteps of those that it is given."""
 
     @model_validator(mode="after")
     def _fits(self) -> "Driver":
         if self.kind == "plain":
             if self.microsteps is not None:
-                raise ValueError("a plain driver has its own switches for microsteps: leave microsteps out")
+                raise KeyFault("microsteps", "a plain driver has its own switches for them: leave this key out")
             if self.half is None:
-                raise ValueError("a plain driver needs half = 'PIN', the input that halves its current; or no table")
+                raise KeyFault(
+                    "half", "a plain driver needs it, half = 'PIN', the input that halves its current; or no table"
+                )
             return self
         if self.half is not None:
-            raise ValueError(f"a {self.kind} gets its current by its registers: leave out half")
+            raise KeyFault("half", f"a {self.kind} gets its current by its registers: leave this key out")
         if self.kind in ("tmc2208", "tmc2209"):
             if self.uart is None:
-                raise ValueError(f"a {self.kind} is told by its UART: uart = 'PIN'")
+                raise KeyFault("uart", f"a {self.kind} is told by its UART: uart = 'PIN'")
         elif self.select is None:
-            raise ValueError(f"a {self.kind} is told by SPI: select = 'PIN', and bus or clock, mosi and miso")
+            raise KeyFault("select", f"a {self.kind} is told by SPI: select = 'PIN', and bus or clock, mosi and miso")
         elif (self.bus is None) == (self.clock is None or self.mosi is None or self.miso is None):
-            raise ValueError("give bus = 'NAME' of the board's own SPI, or the pins clock, mosi and miso")
+            raise KeyFault("bus", "give bus = 'NAME' of the board's own SPI, or the pins clock, mosi and miso")
         return self
 
     def pins(self) -> dict[str, str]:
@@ -172,7 +179,7 @@ class Hardware(_Table):
     """Limit and home switches that this machine does not have."""
     sample: DurationField = 50 * US
     """An input that stops an axis is looked at so often: 10 us to 10 ms."""
-    samples: Annotated[int, Field(ge=1, le=255)] = 2
+    samples: Annotated[int, NoFlag, Field(ge=1, le=255)] = 2
     """And believed after so many looks that are alike."""
     driver: Driver | None = None
     """How a stepper driver gets its current: a table `driver`."""
@@ -182,11 +189,12 @@ class Hardware(_Table):
         if self.step is None:
             for key in ("dir", "minus", "enable", "pulse", "driver"):
                 if getattr(self, key) is not None:
-                    raise ValueError(f"{key} is of an axis that is driven: give step = 'PIN' too")
+                    raise KeyFault(key, "it is of an axis that is driven: give step = 'PIN' too")
         elif self.dir is None:
-            raise ValueError("dir is missing: the firmware needs a pin for it, a spare one where there are two clocks")
+            what = "this key is missing: the firmware needs a pin for it, a spare one where there are two clocks"
+            raise KeyFault("dir", what)
         if not 10 * US <= self.sample <= 10 * MS:
-            raise ValueError("sample is 10 us to 10 ms")
+            raise KeyFault("sample", "10 us to 10 ms")
         return self
 
     def pins(self) -> dict[str, str]:
@@ -208,7 +216,10 @@ def by_axis(tables: object) -> object:
         if not isinstance(table, Mapping):
             found[str(unit)] = table
             continue
-        axes = {k: v for k, v in table.items() if isinstance(v, Mapping) and k not in Hardware.model_fields}
+        keys = Hardware.model_fields
+        axes = {
+            k: v for k, v in table.items() if isinstance(v, Mapping) and k not in keys and (not v or v.keys() & keys)
+        }
         found |= {f"{unit}.{axis}": each for axis, each in axes.items()}
         if len(axes) < len(table) or not table:
             found[str(unit)] = {key: value for key, value in table.items() if key not in axes}

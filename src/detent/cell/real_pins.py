@@ -21,6 +21,12 @@ class Joined(NamedTuple):
     drivers: Sequence[str]
 
 
+def device_of(address: str) -> tuple[str, str]:
+    """The device in the address of a board, and the baud rate behind an `@`; "": none is given."""
+    device, at, baud = address.rpartition("@")
+    return (device, baud) if at and baud.isdigit() else (address, "")
+
+
 def bare(pin: str) -> str:
     """The name of a pin of a board without its signs."""
     return pin.lstrip("!^~")
@@ -34,6 +40,7 @@ def check(described: Description, controllers: Mapping[str, Controller], joined:
         other = next(name for name in leads if leads[name] != next(iter(leads.values())))
         what = f"it is {show_duration(leads[other])} here and {show_duration(next(iter(leads.values())))} elsewhere"
         raise Problem(described.file, f"boards.{other}.lead", f"{what}: what happens together has to leave together")
+    _check_devices(described, used)
     taken: dict[tuple[str, str], str] = {}
     wired: dict[tuple[str, str], str] = {}
     for key, table in described.hardware.items():
@@ -80,6 +87,18 @@ def check(described: Description, controllers: Mapping[str, Controller], joined:
         unit, _, axis = key.partition(".")
         if table.step is not None:
             _check_switches(described, key, controllers[unit], axis, joined)
+
+
+def _check_devices(described: Description, used: set[str]) -> None:
+    """No device is two things: two boards, or a board and the wire to a host."""
+    devices: dict[str, str] = {}
+    wires = {f"lines.{name}.endpoint": line.endpoint or "" for name, line in described.lines.items()}
+    boards = {f"boards.{name}.serial": board.serial for name, board in described.boards.items() if name in used}
+    for key, device in [*boards.items(), *((k, e.removeprefix("serial:")) for k, e in wires.items() if "serial:" in e)]:
+        device = device_of(device)[0]
+        other = devices.setdefault(device, key)
+        if other != key and not device.startswith("fake:"):
+            raise Problem(described.file, key, f"{device} is {other} already: each has a device of its own")
 
 
 def _model(described: Description, part: str) -> str:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from detent.cell.description import Description
+from detent.cell.real_pins import device_of
 from detent.realtime.boards.ports import FAKE
 from detent.realtime.endpoints.spec import EndpointSpec
 
@@ -17,8 +18,7 @@ def devices(described: Description, endpoints: Sequence[EndpointSpec], *, real: 
     if real:
         used = {table.board for table in described.hardware.values()}
         for name, board in described.boards.items():
-            device, at, baud = board.serial.rpartition("@")
-            device = device if at and baud.isdigit() else board.serial
+            device = device_of(board.serial)[0]
             if name in used and not device.startswith(FAKE):
                 found.setdefault(device, f"boards.{name}.serial")
     for one in endpoints:

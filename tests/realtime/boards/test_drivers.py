@@ -54,14 +54,42 @@ def test_bits_on_the_wire() -> None:
 
 
 def test_currents() -> None:
-    """TMC2209 section 9: (CS + 1) / 32 * 0.320 V / (0.11 + 0.02) / sqrt 2 is 1.7406 A at 32/32, 0.979 A with vsense."""
+    """TMC2209 section 9: (CS + 1) / 32 * 0.325 V / (0.11 + 0.02) / sqrt 2 is 1.7678 A at 32/32, 0.979 A with vsense."""
     full = values(chip(amperes=1.5), HALF)
     run, hold = full["IHOLD_IRUN"] >> 8 & 31, full["IHOLD_IRUN"] & 31
-    assert (run, hold) == (round(1.5 / 1.7406 * 32) - 1, round(0.75 / 1.7406 * 32) - 1)
+    assert (run, hold) == (round(1.5 / 1.7678 * 32) - 1, round(0.75 / 1.7678 * 32) - 1)
     assert not full["CHOPCONF"] >> 17 & 1
     low = values(chip(amperes=0.9), HALF)
     assert low["CHOPCONF"] >> 17 & 1  # vsense: the finer range
     assert low["IHOLD_IRUN"] >> 8 & 31 == round(0.9 / 0.97909 * 32) - 1
+
+
+@pytest.mark.parametrize(
+    ("sense", "amperes"),
+    [(1.00, 0.23), (0.75, 0.30), (0.50, 0.44), (0.33, 0.66), (0.22, 0.96), (0.15, 1.35), (0.12, 1.64), (0.10, 1.92)],
+)
+def test_currents_of_the_data_sheet(sense: float, amperes: float) -> None:
+    """TMC2209 section 8: what resistors give with IRUN 31 and vsense 0, to a hundredth."""
+    full = values(chip(sense=sense, amperes=amperes - 0.005), HALF)
+    assert full["IHOLD_IRUN"] >> 8 & 31 >= 30
+    assert not full["CHOPCONF"] >> 17 & 1
+    with pytest.raises(SetupProblem, match=f"gives {amperes:.2f} A a phase"):
+        settings(chip(sense=sense, amperes=amperes + 0.006), HALF)
+
+
+@pytest.mark.parametrize("kind", ["tmc2208", "tmc2209", "tmc2130", "tmc5160"])
+def test_the_current_is_within_half_a_step_of_what_was_asked(kind: Any) -> None:
+    for thousandths in range(40, 1400, 7):
+        asked = thousandths / 1000
+        made = chip(kind, sense=0.075 if kind == "tmc5160" else 0.1, amperes=asked)
+        found = values(made, HALF)
+        if kind == "tmc5160":
+            full = found["GLOBALSCALER"] / 256 * 0.325 / 0.075 / 2**0.5
+        else:
+            volts = 0.180 if found["CHOPCONF"] >> 17 & 1 else 0.320 if kind == "tmc2130" else 0.325
+            full = volts / 0.12 / 2**0.5
+        for scale, wanted in ((found["IHOLD_IRUN"] >> 8 & 31, asked), (found["IHOLD_IRUN"] & 31, asked / 2)):
+            assert abs((scale + 1) / 32 * full - wanted) <= full / 64 + 1e-9
 
 
 def test_amperes_of_a_controller_that_chops() -> None:
@@ -98,7 +126,17 @@ def test_times() -> None:
     ("made", "stage", "key", "said"),
     [
         (chip(amperes=None), HALF, "amperes", "amperes = 0.8"),
-        (chip(amperes=2.5), HALF, "sense", "gives 1.74 A a phase, not 2.50: say that less will do, amperes = 1.7, or "),
+        (chip(amperes=1.9), HALF, "sense", "gives 1.77 A a phase, not 1.90: say that less will do, amperes = 1.7, or "),
+        (
+            chip(amperes=2.5),
+            HALF,
+            "kind",
+            "a tmc2209 carries 2 A a phase, not 2.50: say that less will do, amperes = 2, ",
+        ),
+        (chip("tmc2208", amperes=1.5, sense=0.1), HALF, "kind", "carries 1.4 A a phase"),
+        (chip("tmc2130", amperes=1.5, sense=0.1), HALF, "kind", "carries 1.4 A a phase"),
+        (chip(amperes=0.02), HALF, "amperes", "gives 0.0306 A a phase at least: take a larger resistor"),
+        (chip("tmc5160", sense=0.075, amperes=0.01), HALF, "amperes", "gives 0.012 A a phase at least"),
         (chip("tmc5160", sense=0.075, amperes=4.0), HALF, "sense", "gives 3.06 A a phase, not 4.00"),
         (chip(sense=0.0), HALF, "sense", "write it in ohm"),
         (chip(), HALF._replace(places=24), "kind", "24/64 of a full step a pulse"),

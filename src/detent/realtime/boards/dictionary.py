@@ -130,9 +130,11 @@ class Dictionary:
 
     @property
     def pins(self) -> tuple[str, ...]:
-        """The names of its pins, in the order of their numbers."""
-        numbers = self._numbers.get("pin", {})
-        return tuple(sorted(numbers, key=numbers.__getitem__))
+        """The names of its pins, in the order of their numbers; of several for one pin, the shortest."""
+        names: dict[int, str] = {}
+        for name, number in self._numbers.get("pin", {}).items():
+            names[number] = min(names.get(number, name), name, key=len)
+        return tuple(names[number] for number in sorted(names))
 
     @property
     def reserved(self) -> dict[str, str]:
@@ -143,13 +145,17 @@ class Dictionary:
                 found |= {pin.strip(): name[len(_RESERVED) :] for pin in str(value).split(",")}
         return found
 
+    def has_pin(self, name: str) -> bool:
+        """Whether there is a pin of that name."""
+        return name in self._numbers.get("pin", {})
+
     def number(self, kind: str, name: str) -> int:
         """The number of a pin, an SPI bus ... by its name. KeyError whose text has the nearest ones."""
         numbers = self._numbers.get(kind, {})
         try:
             return numbers[name]
         except KeyError:
-            near = get_close_matches(name, numbers, 3) or list(numbers)[:3]
+            near = get_close_matches(name, numbers, 3) or sorted(numbers, key=numbers.__getitem__)[:3]
             hint = f"; it has {', '.join(near)} ..." if near else ""
             raise KeyError(f"the board ({self.mcu}) has no {kind.replace('_', ' ')} {name}{hint}") from None
 

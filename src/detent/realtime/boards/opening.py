@@ -1,15 +1,18 @@
 """Opening the boards of a plan and waiting until they are ready: before a cell is switched on, or only to look."""
 
+import os
 import select
 import time
 from collections.abc import Callable, Mapping, Sequence
 
 from detent.cell.description import Problem
+from detent.cell.real_pins import device_of
 from detent.controllers.device import Stage
 from detent.pins import Level
 from detent.realtime.boards.events import DriverFault, DriverSet, Lost, Ready, Refusal
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.port import Port
+from detent.realtime.boards.ports import FAKE
 from detent.realtime.boards.setup import SetupProblem
 from detent.realtime.boards.several import Boards
 from detent.realtime.pace import WallNs
@@ -28,8 +31,13 @@ class NotYet(Problem):
 def boards_of(plan: Plan, open_port: Callable[[str], Port]) -> Boards:
     """The boards of a plan with their ports open; nothing is said yet. Raises Problem."""
     opened: list[Port] = []
+    devices: dict[str, str] = {}
     try:
         for setup, address in plan.setups:
+            other = devices.setdefault(os.path.realpath(device_of(address)[0]), setup.name)
+            if other != setup.name and not address.startswith(FAKE):
+                what = f"{address} is the device of boards.{other} by another name: each board has one of its own"
+                raise Problem(plan.file, f"boards.{setup.name}.serial", what)
             try:
                 opened.append(open_port(address))
             except OSError as error:

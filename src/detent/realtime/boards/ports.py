@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from detent.cell.real_pins import device_of
 from detent.realtime.boards.board import Board, State
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.chips import Chips
@@ -42,8 +43,8 @@ class SerialPort:
         PortError with the remedy.
         """
         self.address = address
-        device, at, baud = address.rpartition("@")
-        self._device, self._baud = (device, baud) if at and baud.isdigit() else (address, str(BAUD))
+        self._device, baud = device_of(address)
+        self._baud = baud or str(BAUD)
         self._port: object | None = None
         self._descriptor = -1
         self._waiting = bytearray()

@@ -18,10 +18,12 @@ GLOBAL_SCALER = 0x0B  # TMC5160
 CHOPCONF, DRV_STATUS, PWMCONF = 0x6C, 0x6F, 0x70
 
 MOST_CURRENT = 31  # of the current scale, in 32nds
-FULL_SCALE = 0.320  # V across the sense resistor, 2208/2209/2130 with vsense 0 (2209 section 9, 2130 section 9)
+FULL_SCALE = {"tmc2208": 0.325, "tmc2209": 0.325, "tmc2130": 0.320, "tmc5160": 0.325}
+"""V across the sense resistor at scale 32/32, with vsense 0 where there is one: typical, of the electrical sections."""
 LOW_SCALE = 0.180  # with vsense 1
 EXTRA = 0.020  # ohm within these chips, in series
-FULL_SCALE_5160 = 0.325  # V (5160 section 9)
+RATED = {"tmc2208": 1.4, "tmc2209": 2.0, "tmc2130": 1.4}
+"""A, RMS: what the power stages within the chips carry at most; a 5160 has those outside."""
 CLOCK = 12_000_000  # Hz of the chips' own oscillator
 
 
@@ -77,13 +79,21 @@ def _scaled(chip: DriverSetup, most: float) -> tuple[float, bool, int | None]:
     """
     if chip.sense <= 0:
         raise SetupProblem(chip.name, "sense", f"a sense resistor of {chip.sense:g} ohm: write it in ohm, like 0.11")
+    if most > RATED.get(chip.kind, most):
+        limit = RATED[chip.kind]
+        what = f"a {chip.kind} carries {limit:g} A a phase, not {most:.2f}"
+        raise SetupProblem(
+            chip.name, "kind", f"{what}: say that less will do, amperes = {limit:g}, or take another driver"
+        )
     if chip.kind == "tmc5160":
-        full = FULL_SCALE_5160 / chip.sense / sqrt(2)
+        full = FULL_SCALE[chip.kind] / chip.sense / sqrt(2)
         if most > full:
             raise _too_much(chip, most, full)
+        _enough(chip, full * 32 / 256 / 32)
         scaler = min(max(-(-int(most / full * 256 * 1000) // 1000), 32), 256)
         return full * scaler / 256, False, scaler
-    low, high = (volts / (chip.sense + EXTRA) / sqrt(2) for volts in (LOW_SCALE, FULL_SCALE))
+    low, high = (volts / (chip.sense + EXTRA) / sqrt(2) for volts in (LOW_SCALE, FULL_SCALE[chip.kind]))
+    _enough(chip, low / 32)
     if most <= low:
         return low, True, None
     if most > high:
@@ -96,6 +106,13 @@ def _too_much(chip: DriverSetup, most: float, full: float) -> SetupProblem:
     what = f"a {chip.kind} with {chip.sense:g} ohm gives {full:.2f} A a phase, not {most:.2f}"
     remedy = f"say that less will do, amperes = {limit:g}, or take a smaller resistor or another driver"
     return SetupProblem(chip.name, "sense", f"{what}: {remedy}")
+
+
+def _enough(chip: DriverSetup, least: float) -> None:
+    """The current that somebody wrote down is not less than the chip's least."""
+    if chip.amperes is not None and chip.amperes < least:
+        what = f"a {chip.kind} with {chip.sense:g} ohm gives {least:.3g} A a phase at least"
+        raise SetupProblem(chip.name, "amperes", f"{what}: take a larger resistor, or a motor for more")
 
 
 def _in_32nds(chip: DriverSetup, current: float, full: float) -> int:

@@ -90,13 +90,20 @@ def unsuited(setup: BoardSetup, found: Dictionary) -> tuple[str, str, str] | Non
     if missing or not found.frequency:
         return "", "", (f"its firmware ({found.version or 'without a version'}) has no {', '.join(missing)}; flash it "
                         "with a current one")  # fmt: skip
+    reserved = {found.number("pin", pin): use for pin, use in found.reserved.items() if found.has_pin(pin)}
+    names: dict[int, tuple[str, str]] = {}
     for item, key, name in _all_pins(setup):
         try:
-            found.number("spi_bus" if key == "bus" else "pin", name)
+            number = found.number("spi_bus" if key == "bus" else "pin", name)
         except KeyError as error:
             return item, key, error.args[0]
-        if key != "bus" and name in found.reserved:
-            return item, key, f"the board needs {name} itself, for {found.reserved[name]}; use another pin"
+        if key == "bus":
+            continue
+        if number in reserved:
+            return item, key, f"the board needs {name} itself, for {reserved[number]}; use another pin"
+        other, owner = names.setdefault(number, (name, f"{item}.{key}"))
+        if other != name:  # under one name it was looked for before
+            return item, key, f"{name} is the pin {other}, which is taken by {owner}; use another for one of them"
     most = MOST_WATCHDOG // found.frequency
     for out in setup.outs:
         if out.watchdog is not None and out.watchdog * found.frequency // SECOND > MOST_WATCHDOG:
