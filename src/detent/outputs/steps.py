@@ -93,8 +93,8 @@ class Runs:
     too slow for the train.
     """
 
-    __slots__ = ("_add", "_at", "_error", "_full", "_hi", "_last", "_lo", "_longest", "_made", "_rest", "_scale",
-                 "_train", "base", "next")  # fmt: skip
+    __slots__ = ("_add", "_at", "_due", "_due_of", "_error", "_full", "_hi", "_last", "_lo", "_longest", "_made",
+                 "_rest", "_scale", "_train", "base", "next")  # fmt: skip
 
     def __init__(self, train: Train, scale: Scale, error: Error, base: int, first: int = 1,
                  last: int | None = None, *, longest: int | None = None) -> None:  # fmt: skip
@@ -104,6 +104,7 @@ class Runs:
         self._last = train.steps if last is None else last  # None: without an end
         self._longest = MOST_STEPS if longest is None else longest
         self._rest: Run | None = None  # of the run found last
+        self._due_of, self._due = 0, 0  # the pulse that was asked for last, and its tick
         self._made = first  # the first pulse that no run has been found for
         self._add = 0  # of the run found last: a good guess for the next
         self._full = first  # the first pulse without a window
@@ -140,7 +141,9 @@ class Runs:
         """The tick nearest to the time of pulse `next`, which may be off by the error; None if there is none."""
         if self._last is not None and self.next > self._last:
             return None
-        return self._scale.tick(self._train.time_of(self.next))
+        if self._due_of != self.next:
+            self._due_of, self._due = self.next, self._scale.tick(self._train.time_of(self.next))
+        return self._due
 
     def _find(self) -> Run:
         """The longest run from `base` on, whose pulses begin with `_made` == `next`."""

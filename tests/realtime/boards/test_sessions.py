@@ -4,14 +4,15 @@ Hosts say what they like, hands press what they like, the computer stalls. At th
 has it, every input is in the cell as it is on the board, no host heard what was taken back, and no axis is at fault.
 """
 
+from collections import deque
 from random import Random
 from typing import NamedTuple
 
 import pytest
-from tests.realtime.boards.driven_bench import Bench
+from tests.realtime.boards.driven_bench import Bench, pulses
 
 from detent.realtime.boards.states import Standing, Weight
-from detent.ticks import MS, SECOND, US
+from detent.ticks import MS, SECOND, US, Ns
 
 BOARD = '[boards.b]\nserial = "fake"\nlead = "{lead} ms"\n'
 
@@ -178,3 +179,62 @@ def test_an_input_that_stops_two_axes_stops_both_and_each_count_is_the_boards(la
         bench.run(SECOND)
         bench.rest()
         assert [bench.position("x.X"), bench.position("x.Y")] == [stopped[0] - 30, stopped[1]]
+
+
+def late_together(seed: int) -> tuple[int, int]:
+    """Two motors of a unit, a computer that is late, a stop of both: one time for both. Slips and stops."""
+    random = Random(seed)
+    text = KINDS["bs0610"].text + BOARD.format(lead=random.choice([10, 30, 60]))
+    with Bench(text, jitter=lambda: random.randrange(400 * US)) as bench:
+        bench.driven._forget = lambda: None  # type: ignore[method-assign]
+        bench.run(400 * MS)
+        first, second = random.sample(["X", "Y"], 2)
+        bench.send("x", f"{first}{random.choice('+-')}S".encode())
+        for _ in range(random.randrange(3)):
+            bench.run(random.randrange(120 * MS))
+            bench.stall(random.randrange(150 * MS))
+        bench.send("x", f"{second}{random.choice(['+S', '-S', '60G', '-200G'])}".encode())
+        for _ in range(random.randrange(1, 3)):
+            bench.run(random.randrange(120 * MS))
+            bench.stall(random.randrange(150 * MS))
+        bench.run(random.randrange(150 * MS))
+        bench.press("x.RST", 0)
+        bench.run(500 * MS)
+        bench.rest()
+        axes = bench.driven.axes()
+        assert all("slipped" in news.text for news in bench.news), bench.news
+        assert [state.shaft for state in axes] == [bench.position("x.X"), bench.position("x.Y")]
+        assert len({(state.slips, state.slipped) for state in axes}) == 1, "a slip is of the unit"
+        assert len(bench.news) == axes[0].slips
+        same_time(bench)
+        return axes[0].slips, sum(state.stops for state in axes)
+
+
+def same_time(bench: Bench) -> None:
+    """What the axes of a unit did at the same time comes at the same time: the lag is of the unit, and only grows."""
+    scale = bench.boards.boards["b"].core.scale
+    behind: list[tuple[Ns, Ns]] = []
+    for axle in bench.driven.axles:
+        told = pulses(axle.motions.since(0), bench.cell.now)
+        edges = bench.edges(axle.name)
+        # the input is sampled for each of them, at most 100 us apart: a pulse may be between
+        assert 0 <= abs(len(told) - len(edges)) <= 1, axle.name
+        behind += [(at, scale.time(tick) - at) for (tick, _), (at, _) in zip(edges, told, strict=False)]
+    behind.sort()
+    worst, before = 0, deque(behind)
+    for at, lag in behind:
+        while before[0][0] < at - bench.plan.lead:  # what waited at the host when others had left is later
+            worst = max(worst, before.popleft()[1])
+        assert lag >= worst - 3 * US, "an axis was less late than the other had been"
+
+
+def test_the_axes_of_a_unit_are_late_together() -> None:
+    slips, stops = (sum(counts) for counts in zip(*(late_together(seed) for seed in range(12)), strict=True))
+    assert slips > 8
+    assert stops > 12
+
+
+@pytest.mark.slow
+def test_the_axes_of_a_unit_are_late_together_in_many_sessions() -> None:
+    for seed in range(100, 400):
+        late_together(seed)

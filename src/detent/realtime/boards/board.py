@@ -209,7 +209,7 @@ class Board:
         link, patience = self.core.link, self.setup.margin // 2
         link.flush(wall)
         for _ in range(1 if clock is None else ATTEMPTS):
-            undo = None if clock is None else self._equipment.kept()
+            undo = None if clock is None else self._equipment.kept(wall)
             waits = work(wall)
             link.flush(wall)
             if clock is None or undo is None:

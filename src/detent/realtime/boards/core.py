@@ -8,7 +8,7 @@ from detent.outputs.steps import Scale
 from detent.realtime.boards.clock import Clock, nearest
 from detent.realtime.boards.dictionary import BARE, Dictionary, Message, Value
 from detent.realtime.boards.events import Event
-from detent.realtime.boards.fresh import Undo, kept, together
+from detent.realtime.boards.fresh import Undo, together
 from detent.realtime.boards.link import Link
 from detent.realtime.boards.setup import BoardSetup
 from detent.realtime.pace import WallNs
@@ -138,7 +138,15 @@ class Core:
 
     def kept(self) -> Undo:
         """As it is now, again: nothing of what is said from now on has been said."""
-        return together((kept(self), kept(self.link), self.queue.kept()))
+        undo = together((self.link.kept(), self.queue.kept()))
+        count, questions, slips = len(self.events), self._questions.copy(), self.slips
+
+        def back() -> None:
+            undo()
+            del self.events[count:]
+            self._questions, self.slips = questions, slips
+
+        return back
 
     def forget_questions(self) -> None:
         """Nobody wants to know any more."""

@@ -2,19 +2,23 @@
 
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from heapq import heapify, heappop, heapreplace
 
 from detent.realtime.boards.core import Core
 from detent.realtime.boards.dictionary import Value
 from detent.realtime.boards.drivers import Driver, Wire
 from detent.realtime.boards.fresh import Undo, kept, together
 from detent.realtime.boards.inputs import Inputs
+from detent.realtime.boards.lag import settle
 from detent.realtime.boards.outs import DigitalOut
 from detent.realtime.boards.setup import DriverSetup, InputSetup, SetupProblem
 from detent.realtime.boards.stepper import Stepper
 from detent.realtime.boards.stops import Stop
 from detent.realtime.pace import WallNs
 from detent.ticks import Ns
+
+ONE_RUN = 40  # bytes of messages at most, with a direction and a clock
 
 
 class Equipment:
@@ -123,31 +127,56 @@ class Equipment:
 
     def commit(self, now: Ns, wall: WallNs) -> bool:
         """The cell is at `now`: send what is certain. Whether an output waits until stops were heard of."""
-        for name, stop in self.stops.items():
-            if stop.pending:
-                self.steppers[name].settle(now, wall)
-                stop.commit(wall)
-        for axis in self.steppers.values():
-            axis.commit(now, wall)
         waits, heard = False, self.heard()
         for out in self.outs.values():
-            waits |= out.commit(wall, heard)
+            if out.wants(wall):
+                waits |= out.commit(wall, heard)
+        link, unarmed = self._core.link, set[str]()
+        for name, stop in self.stops.items():
+            if stop.pending:
+                if link.spare < stop.bytes_to_say and not link.idle:
+                    unarmed.add(name)  # and no pulse leaves before it
+                    continue
+                settle([axis for axis in self.steppers.values() if axis.of is self.steppers[name].of], now, wall)
+                stop.commit(wall)
+        settle(self.steppers.values(), now, wall)
+        self._send([axis for name, axis in self.steppers.items() if name not in unarmed], now, wall)
         return waits
+
+    def _send(self, axes: Sequence[Stepper], now: Ns, wall: WallNs) -> None:
+        """Their pulses, those first that are due first, as far as nothing has to wait for an acknowledgement.
+
+        What would have to is made when it has come: it might be late by then.
+        """
+        turns: list[tuple[int, int, Iterator[int]]] = []
+        for number, axis in enumerate(axes):
+            runs = axis.sending(now, wall)
+            due = next(runs, None)
+            if due is not None:
+                turns.append((due, number, runs))
+        heapify(turns)
+        while turns and self._core.link.spare >= ONE_RUN:
+            _, number, runs = turns[0]
+            due = next(runs, None)
+            if due is None:
+                heappop(turns)
+            else:
+                heapreplace(turns, (due, number, runs))
 
     def talk(self, wall: WallNs) -> None:
         """Begin to write to driver chips what was commanded: that has no time of its own."""
         for driver in self.drivers.values():
             driver.commit(wall)
 
-    def kept(self) -> Undo:
-        """As it is now, again: what `commit` and `feed` change."""
+    def kept(self, wall: WallNs) -> Undo:
+        """As it is now, again: what `commit` and `feed` change at `wall`."""
         changing: list[Undo] = [self._core.kept()]
         for name, stop in self.stops.items():
             if stop.pending:
                 changing.append(kept(stop))
             if stop.pending or not self.steppers[name].resting:
                 changing.append(self.steppers[name].kept())
-        changing += [kept(out) for out in self.outs.values() if not out.dead]
+        changing += [kept(out) for out in self.outs.values() if out.wants(wall)]
         return together(changing)
 
     def deadlines(self) -> list[WallNs | None]:

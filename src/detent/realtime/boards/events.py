@@ -49,7 +49,19 @@ class Stopped(NamedTuple):
 
 
 class Slipped(NamedTuple):
-    """A batch was late: every pulse of this stepper from the one of cell time `at` on comes `by` later than before."""
+    """A batch was late: every pulse of its unit from cell time `at` on that has not left comes `by` later than before.
+
+    `stepper` is the axis that was the latest.
+    """
+
+    board: str
+    stepper: str
+    at: Ns
+    by: Ns
+
+
+class Later(NamedTuple):
+    """The same, and nobody was late: behind a stop, or as a stop has to come into force first."""
 
     board: str
     stepper: str
@@ -123,6 +135,6 @@ class Refusal(NamedTuple):
 
 
 Event: TypeAlias = (
-    Ready | InputChanged | Stopped | Slipped | CountDiffers | ShutDown | Recovered | Lost | DriverFault | DriverSet
-    | Refusal
+    Ready | InputChanged | Stopped | Slipped | Later | CountDiffers | ShutDown | Recovered | Lost | DriverFault
+    | DriverSet | Refusal
 )  # fmt: skip

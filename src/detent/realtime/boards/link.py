@@ -11,6 +11,7 @@ from collections import deque
 from typing import NamedTuple
 
 from detent.realtime.boards.frames import END, ROOM, SEQUENCES, SMALLEST, Block, Reader, block
+from detent.realtime.boards.fresh import Undo
 from detent.realtime.pace import WallNs
 from detent.ticks import MS
 
@@ -71,7 +72,7 @@ class Link:
         room = blocks * ROOM
         if self.window is not None:
             room = min(room, self.window - SMALLEST * blocks - self._bytes_under_way)
-        return room - sum(map(len, self._waiting))
+        return room - sum(map(len, self._waiting)) if self._waiting else room
 
     @property
     def backlog(self) -> int:
@@ -118,6 +119,17 @@ class Link:
             self.blocks += 1
             if self._again_at is None:
                 self._again_at = wall + self._patience
+
+    def kept(self) -> Undo:
+        """As it is now, again, as far as nothing was taken: what is sent and flushed from now on was not."""
+        waiting, under_way, out = self._waiting.copy(), self._under_way.copy(), bytes(self._out)
+        numbers = self._next, self._bytes_under_way, self._again_at, self.blocks
+
+        def undo() -> None:
+            self._waiting, self._under_way, self._out = waiting, under_way, bytearray(out)
+            self._next, self._bytes_under_way, self._again_at, self.blocks = numbers
+
+        return undo
 
     def take(self) -> bytes:
         """The bytes to put on the wire."""

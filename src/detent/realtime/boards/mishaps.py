@@ -7,6 +7,7 @@ from detent.realtime.boards.events import (
     DriverSet,
     Event,
     InputChanged,
+    Later,
     Lost,
     Ready,
     Recovered,
@@ -43,10 +44,14 @@ class Mishaps(TakingBack):
                     axle.guard.fired()
                     self._place(axle, event.shaft)
                 self._heard(event.levels)
-            case Slipped(_, stepper, at, by):
+            case Later(_, stepper, at, _):
                 self._later(self._by_stepper[stepper], at)
-                slips = self._by_stepper[stepper].stepper.slips
-                what = f"{stepper} slipped by {show_duration(by)}: the computer was late; no step is lost"
+            case Slipped(_, stepper, at, by):
+                axle = self._by_stepper[stepper]
+                self._later(axle, at)
+                slips = axle.stepper.slips
+                who = stepper if len(axle.stepper.of.axes) == 1 else axle.what.unit
+                what = f"{who} slipped by {show_duration(by)}: the computer was late; no step is lost"
                 self._say(Weight.WARNING, f"{what} ({slips} {'slip' if slips == 1 else 'slips'} so far)")
             case CountDiffers(_, stepper, shaft, counted):
                 axle = self._by_stepper[stepper]

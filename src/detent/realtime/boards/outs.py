@@ -12,6 +12,9 @@ from detent.ticks import MS, Ns
 HOLD: Ns = 8 * MS
 """A change is given to the board so long before it is due (or two margins): until then it can be taken back."""
 
+RETRY: WallNs = 1 * MS  # where a board has no room
+ONE_CHANGE = 16  # bytes of its message at most
+
 
 class _Change(NamedTuple):
     at: Ns  # cell time
@@ -38,6 +41,7 @@ class DigitalOut:
         self._back: bool | None = None  # taken back: the level that it had there
         self._rewound = False
         self._fed_at: WallNs | None = None
+        self._again_at: WallNs = 0  # not before: there was no room
         self.dead = True  # shut down, or not configured: nothing is sent
 
     def config(self) -> tuple[str, dict[str, Value | str]]:
@@ -83,7 +87,7 @@ class DigitalOut:
         That is the wall time up to which stops of the board have been heard of (None: there are none). What is late
         already waits for it, as one that took place meanwhile would take it back.
         """
-        if self.dead or not (self._pending or self._back is not None or self._hungry(wall)):
+        if not self.wants(wall):
             return False
         core = self._core
         soonest = core.soonest(wall)
@@ -108,6 +112,10 @@ class DigitalOut:
             self._give(tick, self.level, soonest, wall)
         return waits
 
+    def wants(self, wall: WallNs) -> bool:
+        """Whether there is anything to give to the board, soon or now."""
+        return not self.dead and (bool(self._pending) or self._back is not None or self._hungry(wall))
+
     def _correct(self, level: bool, soonest: int, wall: WallNs) -> None:
         """Behind a rewind: what is set for ticks that are given away already cannot come then."""
         at: Ns = 0
@@ -123,7 +131,8 @@ class DigitalOut:
 
     def _give(self, tick: int, level: bool, soonest: int, wall: WallNs) -> bool:
         core = self._core
-        if core.queue.room(core.clock.tick_at(wall) - core.ticks(UNSURE)) <= 0:
+        if core.queue.room(core.clock.tick_at(wall) - core.ticks(UNSURE)) <= 0 or core.link.spare < ONE_CHANGE:
+            self._again_at = wall + RETRY
             return False
         tick = max(tick, soonest, self._last_tick + 1)
         core.command("queue_digital_out", oid=self.oid, clock=tick & MASK,
@@ -142,7 +151,7 @@ class DigitalOut:
             return None
         if self.setup.watchdog is None or self.level is self.setup.off:
             return None
-        return (self._fed_at or 0) + self.setup.watchdog // 4
+        return max((self._fed_at or 0) + self.setup.watchdog // 4, self._again_at)
 
     def pending_at(self) -> WallNs | None:
         """When the next change has to be given to the board."""

@@ -131,7 +131,7 @@ def _axis(
     assert table.dir is not None
     pulse = table.pulse if table.pulse is not None else max(controller.pulse_output.width, LEAST_PULSE)
     minus = None if table.minus is None else Pin.parse(table.minus)
-    here.steppers.append(StepperSetup(key, Pin.parse(table.step), Pin.parse(table.dir), pulse, minus, stops))
+    here.steppers.append(StepperSetup(key, Pin.parse(table.step), Pin.parse(table.dir), pulse, minus, stops, axis.unit))
     keys[key] = where
     if table.enable is not None:
         axis = axis._replace(enable=f"{key}.enable")

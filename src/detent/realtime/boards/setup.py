@@ -61,7 +61,7 @@ class StepperSetup:
     A pulse is `pulse` long at least, active as `step` says. `dir` is high in direction +1, low in -1, or the other
     way round if it is active low. With `minus` the pulses of direction -1 come there, those of +1 on `step`, and
     `dir` is a spare pin: the firmware cannot do without one. `stops` are the inputs that may stop it (None: every input
-    of the board): each takes an object of the firmware.
+    of the board): each takes an object of the firmware. Axes of one `unit` are late together.
     """
 
     name: str
@@ -70,6 +70,7 @@ class StepperSetup:
     pulse: Ns = 5 * US
     minus: Pin | None = None
     stops: tuple[str, ...] | None = None
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from detent.realtime.boards.board import Board, State
 from detent.realtime.boards.clock import Clock
 from detent.realtime.boards.drivers import Driver
 from detent.realtime.boards.events import Event
+from detent.realtime.boards.lag import Lag, settle
 from detent.realtime.boards.outs import DigitalOut
 from detent.realtime.boards.port import Port, PortLost
 from detent.realtime.boards.setup import BoardSetup, SetupProblem
@@ -63,6 +64,10 @@ class Boards:
             self.outs |= board.outs
             self.stops |= board.stops
             self.drivers |= board.drivers
+        lags: dict[str, Lag] = {}
+        for stepper in self.steppers.values():
+            if stepper.setup.unit:
+                stepper.shares(lags.setdefault(stepper.setup.unit, stepper.of))
         self.master = self._pairs[0][0]
         self.lead: Ns = self.master.setup.lead
         self.batch: WallNs = self.master.setup.batch
@@ -169,6 +174,8 @@ class Boards:
                 self._draw(board, now, None if still else board.core.scale.tick(now))
                 for stepper in board.steppers.values():
                     stepper.rescale()
+        if len(self._pairs) > 1:  # a unit on several boards is late on all of them
+            settle([s for s in self.steppers.values() if self.boards[s.board].state is State.READY], now, wall)
         for board, port in self._pairs:
             board.commit(now, wall, clock)
             self._pump(board, port, wall)

@@ -5,7 +5,7 @@ its mind about later has then not left, or is given at the same times by the new
 """
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
@@ -13,16 +13,15 @@ from detent.outputs.steps import Run, Runs
 from detent.pulses import Train
 from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.dictionary import Message, Value
-from detent.realtime.boards.events import CountDiffers, Slipped
-from detent.realtime.boards.fresh import Undo, kept, together
+from detent.realtime.boards.events import CountDiffers, Later, Slipped
+from detent.realtime.boards.fresh import Undo
+from detent.realtime.boards.lag import SETTLED, Lag, Late
 from detent.realtime.boards.setup import StepperSetup
 from detent.realtime.pace import WallNs
-from detent.ticks import MS, SECOND, Ns
+from detent.ticks import SECOND, Ns
 
 LONGEST = 64  # steps of a run: looking further ahead costs more than it saves where a commit cuts runs anyway
 NOWHERE = -(1 << 62)  # before everything: the first run gets a base of its own
-SETTLED: Ns = 20 * MS  # a rest longer than the lag by this takes it back to 0
-ONE_RUN = 40  # bytes of messages at most, with a direction and a clock
 SPARE = 4  # entries of the move queue that are left to outputs
 
 
@@ -54,15 +53,17 @@ class _Channel:
 class Stepper:
     """An axis on a board; made by `Board` from its `StepperSetup`, found as `board.steppers[name]`.
 
-    `slips` and `slipped`: how often a late batch moved the rest of the train, and by how much in all.
+    What is late moves the rest of all trains of its unit: see `Lag`.
     """
 
     def __init__(self, core: Core, setup: StepperSetup, oids: Sequence[int]) -> None:
         """With a clock for each direction there are two `oids`: + and -."""
         self.name, self.setup = setup.name, setup
-        self.slips = 0
-        self.slipped: Ns = 0
-        self.told_through: Ns | None = None  # cell time of the last pulse sent
+        self.of = Lag()
+        self.shares(self.of)
+        self._own: Ns = 0  # lag beyond that of its unit
+        self._trail: tuple[Ns, Ns] = 0, 0  # the last pulse that came with an earlier lag, and that lag
+        self._through: tuple[Train, int] | None = None  # the last pulse sent
         self._core = core
         sign = -1 if setup.dir.active_low and setup.minus is None else 1
         self._channels = [_Channel(oids[0], sign)]
@@ -70,11 +71,10 @@ class Stepper:
             self._channels.append(_Channel(oids[1], -1))
         self._spans: deque[_Span] = deque()
         self._runs: Runs | None = None
+        self._runs_lag: Ns = 0  # with which they were made
         self._offset = 0  # shaft less what the firmware counts
         self._told = 0  # the shaft behind every pulse told of, with those of an open train as sent
         self._sent = 0
-        self._lag = 0  # ticks
-        self._trail: tuple[Ns, int] = 0, 0  # the last pulse that came with an earlier lag, and that lag
         self._sent_at: WallNs = 0
         self._not_before = NOWHERE  # no pulse up to this tick: a stop is not in force yet
         self._halted = True  # nothing is sent before `adopt` or `rewind`
@@ -102,32 +102,65 @@ class Stepper:
 
     # -- what the cell tells
 
+    def shares(self, lag: Lag) -> None:
+        """It is late together with the other axes of `lag`."""
+        self.of.axes = [axis for axis in self.of.axes if axis is not self]
+        self.of = lag
+        lag.axes.append(self)
+
+    @property
+    def board(self) -> str:
+        """The name of its board."""
+        return self._core.setup.name
+
     @property
     def lag(self) -> Ns:
-        """So much later than the lead its pulses come at present.
+        """So much later than the lead its pulses come at present: that of its unit, and what it needs beyond."""
+        return self.of.now + self._own
 
-        It grows by slips (a late batch) and by pulses that a cell which was taken back gives too late, and is 0 again
-        behind a rest that is long enough.
-        """
-        return self._lag * SECOND // self._core.frequency
+    @property
+    def slips(self) -> int:
+        """How often its unit was late."""
+        return self.of.slips
+
+    @property
+    def slipped(self) -> Ns:
+        """By how much in all."""
+        return self.of.slipped
 
     def behind(self, now: Ns) -> Ns:
         """So much later than the lead come the pulses that have yet to leave at cell time `now`: `lag`, or one before.
 
         What a rest has caught up counts from the motion behind it on: pulses of the motion before are still under way.
         """
-        through, lag = self._trail
-        earlier = lag * SECOND // self._core.frequency
+        through, earlier = self._trail
         return max(self.lag, earlier) if now <= through + self._core.setup.lead + earlier else self.lag
 
     def lag_at(self, tick: int) -> int:
         """The lag, in ticks, of a pulse that was on its way at `tick`."""
+        core = self._core
         through, lag = self._trail
-        return lag if lag and tick <= self._core.scale.tick(through) + lag else self._lag
+        earlier = core.ticks(lag)
+        return earlier if earlier and tick <= core.scale.tick(through) + earlier else core.ticks(self.lag)
+
+    @property
+    def told_through(self) -> Ns | None:
+        """Cell time of the last pulse sent."""
+        return None if self._through is None else self._through[0].time_of(self._through[1])
+
+    def delayed(self, at: Ns, by: Ns, *, slip: bool, own: bool) -> None:
+        """From cell time `at` on it comes later by so much more; `own`: it alone, and not its unit."""
+        if own:
+            self._own += by
+        self._core.events.append((Slipped if slip else Later)(self.board, self.name, at, by))
+
+    def caught_up(self, now: Ns) -> None:
+        """Its next pulse comes a lead behind the cell again, whatever the last one did, which may be under way."""
+        self._trail, self._own = (self.told_through or 0, self.behind(now)), 0
 
     def tick(self, at: Ns) -> int:
         """The tick at which leaves what the axis does at cell time `at`, with the lag that it has now."""
-        return self._core.scale.later(self._lag).tick(at)
+        return self._core.scale.later(self._core.ticks(self.lag)).tick(at)
 
     @property
     def shaft(self) -> int:
@@ -169,15 +202,12 @@ class Stepper:
 
     def _rested(self, train: Train, now: Ns) -> None:
         """A motion begins: the lag of the one before is over if there was time enough between."""
-        if not self._lag or not train.segments:
+        if not self.lag or not train.segments:
             return
-        rest = train.time_of(1) - (self.told_through or 0)
-        if self.told_through is None or rest > self.lag + SETTLED:
-            through, earlier = self._trail
-            lead = self._core.setup.lead
-            under_way = now <= through + lead + earlier * SECOND // self._core.frequency
-            self._trail = self.told_through or 0, max(self._lag, earlier) if under_way else self._lag
-            self._lag = 0
+        first = train.time_of(1)
+        self.of.rested(first, now)
+        if self._own and (self.told_through is None or first - self.told_through > self.lag + SETTLED):
+            self.caught_up(now)
 
     def over(self, wall: WallNs) -> bool:
         """Whether it rests, and the last pulse sent has come."""
@@ -189,7 +219,8 @@ class Stepper:
         self._offset = shaft - self._counted()
         self.rewind(shaft)
         self._regaining = False
-        self._lag, self._trail = 0, (0, 0)
+        self.of.forget()
+        self._own, self._trail = 0, (0, 0)
 
     def rewind(self, shaft: int) -> None:
         """Forget every entry told so far: the firmware has stopped, and counts `shaft`.
@@ -216,30 +247,45 @@ class Stepper:
 
     # -- what leaves
 
-    def settle(self, now: Ns, wall: WallNs) -> None:
-        """Let the lag grow as what `commit` is about to send needs it, so that stops can be sent for it before."""
+    def late(self, now: Ns, wall: WallNs) -> Late | None:
+        """By how much the next pulse that the cell has given up to `now` is too near, and whether that is a slip."""
         due = self.next_pulse()
-        if due is not None and due <= now:
-            span = self._spans[0]
-            self._guard(span, self._runs or self._make(span), wall)
+        if due is None or due > now:
+            return None
+        core, span = self._core, self._spans[0]
+        tick = self._ready(span).due()
+        assert tick is not None
+        error = core.setup.error
+        if error != "exact":
+            tick -= core.ticks(error)
+        soonest = core.soonest(wall)
+        late = max(soonest, self._not_before + 1) - tick
+        slip = soonest > tick and not self._regaining
+        self._regaining = False
+        return None if late <= 0 else Late(-(-late * SECOND // core.frequency), slip)
 
-    def commit(self, now: Ns, wall: WallNs) -> None:
-        """Send every pulse with a time up to `now`, as far as the move queue has room."""
-        guarded = False
+    def sending(self, now: Ns, wall: WallNs) -> Iterator[int]:
+        """Send every pulse with a time up to `now`, as far as the move queue has room; `settle` has been called.
+
+        Before each run it gives the tick at which that is due, and sends it when it is asked for the next one: so
+        whoever has several axes sends what is due first. It may be left off at any time.
+        """
+        core = self._core
+        present = core.clock.tick_at(wall)
         while self._spans:
             span = self._spans[0]
             upto = span.train.steps_by(now)
             if span.last is not None:
                 upto = min(upto, span.last)
-            if span.next <= upto:
-                runs = self._runs
-                if runs is None:
-                    runs = self._runs = self._make(span)
-                if not guarded:
-                    runs, guarded = self._guard(span, runs, wall), True
-                self._send(span, runs, upto, wall)
-                if span.next <= upto:
-                    return  # the queue is full
+            if span.next <= upto and self._may_wait(span, present, wall):
+                return
+            while span.next <= upto:
+                due = self._ready(span).due()
+                assert due is not None
+                yield due
+                if core.queue.room(present - core.ticks(UNSURE)) <= SPARE:
+                    return
+                self._send(span, upto, wall)
             if span.last is None or span.next <= span.last:
                 return
             self._spans.popleft()
@@ -248,73 +294,57 @@ class Stepper:
     def _channel(self, direction: int) -> _Channel:
         return self._channels[-1] if direction < 0 else self._channels[0]
 
-    def _make(self, span: _Span) -> Runs:
-        last = self._channel(span.direction).last
-        core = self._core
-        return Runs(span.train, core.scale.later(self._lag), core.setup.error, NOWHERE if last is None else last,
-                    span.next, longest=LONGEST)  # fmt: skip
-
-    def _guard(self, span: _Span, runs: Runs, wall: WallNs) -> Runs:
-        """See that the next pulse is far enough away; else everything from it on moves later."""
-        core = self._core
-        due = runs.due()
-        assert due is not None
-        error = core.setup.error
-        if error != "exact":
-            due -= core.ticks(error)
-        soonest = core.soonest(wall)
-        late = max(soonest, self._not_before + 1) - due
-        if late <= 0:
-            self._regaining = False
-            return runs
-        self._lag += late
-        if soonest > due and not self._regaining:
-            by = late * SECOND // core.frequency
-            self.slips += 1
-            self.slipped += by
-            core.events.append(Slipped(core.setup.name, self.name, span.train.time_of(span.next), by))
-        self._regaining = False
-        self._runs = self._make(span)
+    def _ready(self, span: _Span) -> Runs:
+        """Its pulses as runs, with the lag that its unit has now."""
+        if self._runs is None or self._runs_lag != self.lag:
+            core, last = self._core, self._channel(span.direction).last
+            self._runs_lag = self.lag
+            self._runs = Runs(span.train, core.scale.later(core.ticks(self.lag)), core.setup.error,
+                              NOWHERE if last is None else last, span.next, longest=LONGEST)  # fmt: skip
         return self._runs
 
     def kept(self) -> Undo:
         """As it is now, again: nothing of what is sent from now on was sent."""
         spans = deque(replace(span) for span in self._spans)
-        undo = together((kept(self), *(kept(channel) for channel in self._channels)))
+        channels = [(channel.last, channel.up) for channel in self._channels]
+        own = (self._own, self._told, self._sent, self._sent_at, self._not_before, self._regaining, self._proved,
+               self._through)  # fmt: skip
+        of = self.of
+        shared = of.now, of.slips, of.slipped
 
-        def back() -> None:
-            undo()
+        def undo() -> None:
             self._spans, self._runs = spans, None
+            for channel, told in zip(self._channels, channels, strict=True):
+                channel.last, channel.up = told
+            (self._own, self._told, self._sent, self._sent_at, self._not_before, self._regaining, self._proved,
+             self._through) = own  # fmt: skip
+            of.now, of.slips, of.slipped = shared
 
-        return back
+        return undo
 
     def rescale(self) -> None:
         """The scale of cell time to ticks has changed: what is sent from now on follows it."""
         self._runs = None
 
-    def _send(self, span: _Span, runs: Runs, upto: int, wall: WallNs) -> None:
-        core, channel = self._core, self._channel(span.direction)
-        up = True if len(self._channels) > 1 else span.direction == channel.sign
-        now = core.clock.tick_at(wall)
-        room = core.queue.room(now - core.ticks(UNSURE)) - SPARE
-        due = runs.due()
+    def _may_wait(self, span: _Span, present: int, wall: WallNs) -> bool:
+        """Whether there is time to gather more: that makes longer runs."""
+        core, due = self._core, self._ready(span).due()
         assert due is not None
-        if due - now > core.ticks(core.setup.lead) // 2 and (
-            wall - self._sent_at < core.setup.batch or 2 * room < core.queue.size
-        ):
-            return  # what waits a little makes longer runs, and there is time
-        self._sent_at = wall
-        # what would have to wait for an acknowledgement is made when it has come: it might be late by then
-        while span.next <= upto and room > 0 and core.link.spare >= ONE_RUN:
-            run = runs.one(upto)
-            self._put(channel, run, up)
-            room -= 2  # a run behind a long rest takes two entries
-            span.next += run.steps
-            self._sent += span.direction * run.steps
-            self._proved = False
+        if due - present <= core.ticks(core.setup.lead) // 2:
+            return False
+        room = core.queue.room(present - core.ticks(UNSURE)) - SPARE
+        return wall - self._sent_at < core.setup.batch or 2 * room < core.queue.size
+
+    def _send(self, span: _Span, upto: int, wall: WallNs) -> None:
+        channel = self._channel(span.direction)
+        run = self._ready(span).one(upto)
+        self._put(channel, run, True if len(self._channels) > 1 else span.direction == channel.sign)
+        span.next += run.steps
+        self._sent += span.direction * run.steps
+        self._sent_at, self._proved = wall, False
         if span.last is None:
             self._told = self._sent
-        self.told_through = span.train.time_of(span.next - 1) if span.next > 1 else self.told_through
+        self._through = span.train, span.next - 1
 
     def _put(self, channel: _Channel, run: Run, up: bool) -> None:
         """Send a run.

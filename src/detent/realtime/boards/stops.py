@@ -17,6 +17,7 @@ from detent.realtime.boards.stepper import Stepper
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, Ns
 
+BEGINNING, ONE_INPUT = 40, 36  # bytes of messages at most: of a trigger that begins, and of an input
 REPORT: Ns = 25 * MS  # of a trigger that is alive
 
 
@@ -73,6 +74,11 @@ class Stop:
     def pending(self) -> bool:
         """Whether something was armed or disarmed that is not sent yet."""
         return bool(self._changes)
+
+    @property
+    def bytes_to_say(self) -> int:
+        """The messages of what is pending take so many bytes at most."""
+        return BEGINNING + ONE_INPUT * sum(1 + len(inputs) for inputs, _ in self._changes)
 
     @property
     def firing(self) -> bool:

@@ -1,0 +1,106 @@
+"""How much later than the lead the axes of a unit come: one time for all of them, so that they stay together.
+
+It grows where a batch is late (a slip), for every axis of the unit alike, and is 0 again behind a rest of all of them
+that is long enough. What a single axis needs beyond that, because a cell that was taken back gives its pulses too late,
+is its own affair while others move: a hole in their pulses would cost them steps.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, Protocol
+
+from detent.realtime.pace import WallNs
+from detent.ticks import MS, NEVER, Ns
+
+SETTLED: Ns = 20 * MS  # a rest longer than the lag by this takes it back to 0
+
+
+class Late(NamedTuple):
+    """By how much the next pulse of an axis is too near, and whether a late computer is to blame."""
+
+    by: Ns
+    slip: bool
+
+
+class Axis(Protocol):
+    """What a lag needs of an axis."""
+
+    of: "Lag"
+
+    @property
+    def told_through(self) -> Ns | None:
+        """The cell time of the last pulse that was sent."""
+
+    @property
+    def resting(self) -> bool:
+        """Whether no pulse is to come."""
+
+    @property
+    def lag(self) -> Ns:
+        """That of its unit, and its own."""
+
+    def next_pulse(self) -> Ns | None:
+        """The cell time of its next pulse."""
+
+    def late(self, now: Ns, wall: WallNs) -> Late | None:
+        """By how much the next pulse that the cell has given up to `now` is too near."""
+
+    def delayed(self, at: Ns, by: Ns, *, slip: bool, own: bool) -> None:
+        """From cell time `at` on it comes later by so much more; `own`: it alone."""
+
+    def caught_up(self, now: Ns) -> None:
+        """Its next pulse comes a lead behind the cell again."""
+
+
+class Lag:
+    """The lag of the `axes` of a unit, on one board or several. `slips` and `slipped`: how often, and by how much."""
+
+    def __init__(self) -> None:
+        self.axes: list[Axis] = []
+        self.now: Ns = 0
+        self.slips = 0
+        self.slipped: Ns = 0
+
+    def rested(self, first: Ns, now: Ns) -> None:
+        """At cell time `now` an axis begins to move, its first pulse at `first`: all of them may have been at rest."""
+        if self.now and self._still(self.axes):
+            through = [axis.told_through for axis in self.axes if axis.told_through is not None]
+            if not through or first - max(through) > max(axis.lag for axis in self.axes) + SETTLED:
+                for axis in self.axes:
+                    axis.caught_up(now)
+                self.now = 0
+
+    def forget(self) -> None:
+        """Nothing is under way that was later, as far as its axes are all at rest."""
+        if self._still(self.axes):
+            self.now = 0
+
+    def grow(self, found: Sequence[tuple[Late, Axis]]) -> None:
+        """These axes are late."""
+        slip = max((late.by for late, _ in found if late.slip), default=0)
+        if slip:
+            latest = next(axis for late, axis in found if late.by == slip and late.slip)
+            self.now += slip
+            self.slips += 1
+            self.slipped += slip
+            latest.delayed(min(axis.next_pulse() or NEVER for axis in self.axes), slip, slip=True, own=False)
+        for late, axis in found:
+            if late.by > slip:
+                alone = not self._still(other for other in self.axes if other is not axis)
+                if not alone:
+                    self.now += late.by - slip
+                axis.delayed(axis.next_pulse() or NEVER, late.by - slip, slip=False, own=alone)
+
+    @staticmethod
+    def _still(axes: Iterable[Axis]) -> bool:
+        return all(axis.resting for axis in axes)
+
+
+def settle(axes: Iterable[Axis], now: Ns, wall: WallNs) -> None:
+    """Let lags grow as what the cell gave up to `now` needs it, before anything of it is sent, or armed for it."""
+    found: dict[Lag, list[tuple[Late, Axis]]] = {}
+    for axis in axes:
+        late = axis.late(now, wall)
+        if late is not None:
+            found.setdefault(axis.of, []).append((late, axis))
+    for lag, ones in found.items():
+        lag.grow(ones)
