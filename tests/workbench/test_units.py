@@ -1,7 +1,7 @@
 """Units that the workbench talks to: looks, lines, hands, STOP; units that stall, babble, lie, or are unplugged."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from detent.realtime.connect import HOSTS
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.service import Service
 from detent.workbench.folder import Folder
-from detent.workbench.live import Live
+from detent.workbench.live import Live, Value
 from detent.workbench.messages import EndpointPicture
 from detent.workbench.stopping import StopFailed, Stopping
 from detent.workbench.units import beside
@@ -117,11 +117,27 @@ def test_options_are_written_as_people_write_them() -> None:
 # -- in real time, against what is served -------------------------------------------------------------------------
 
 
+class Shown(Live):
+    """A table for whoever waits for its next change."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._put = asyncio.Event()
+
+    def put(self, values: Mapping[str, Value]) -> None:
+        super().put(values)
+        self._put.set()
+
+    async def changed(self) -> None:
+        self._put.clear()
+        await self._put.wait()
+
+
 class Desk:
     """Units as windows have them."""
 
     def __init__(self, folder: Path) -> None:
-        self.live = Live()
+        self.live = Shown()
         self.stopping = Stopping(self.live)
         self.units = Units(self.live, self.stopping, Folder(folder), folder / "state")
 
@@ -130,8 +146,21 @@ class Desk:
 
     async def until(self, name: str, condition: Callable[[Any], bool]) -> Any:
         while not ((facts := self.facts(name)) and condition(facts)):
-            await asyncio.sleep(0.01)
+            await self.live.changed()
         return facts
+
+
+def after_each(what: Any, call: str) -> asyncio.Event:
+    """Set whenever the method `call` of `what` was called."""
+    called, done = asyncio.Event(), getattr(what, call)
+
+    def tell(*arguments: Any) -> Any:
+        found = done(*arguments)
+        called.set()
+        return found
+
+    setattr(what, call, tell)
+    return called
 
 
 def at_desk(folder: Path, scene: Callable[[Desk], Awaitable[None]]) -> None:
@@ -238,8 +267,10 @@ def test_stop_comes_before_what_is_pending(tmp_path: Path) -> None:
         facts = await desk.until(name, lambda facts: facts["job"])
         with pytest.raises(UnitBusy, match="under way"):
             await desk.units.unit_say(name, "X")
+        heard = after_each(desk.units._units[name].tap.transcript, "take")
         while "'command', 'I'" not in str((await desk.units.unit_talk(name))["rows"]):
-            await asyncio.sleep(0.01)
+            heard.clear()
+            await heard.wait()
         assert (await desk.stopping.stop_all())[0].startswith(name)
         with pytest.raises(UnitBusy, match="broken off"):
             await pending
@@ -287,7 +318,9 @@ def test_a_unit_that_babbles_or_lies_is_unknown(tmp_path: Path, model: str) -> N
     at_desk(tmp_path, scene)
 
 
-def test_a_port_that_is_lost_shows_at_once_and_is_spoken_to_only_when_asked(tmp_path: Path) -> None:
+def test_a_port_that_is_lost_shows_at_once_and_is_spoken_to_only_when_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     came: list[asyncio.StreamWriter] = []
     heard = bytearray()
 
@@ -305,9 +338,18 @@ def test_a_port_that_is_lost_shows_at_once_and_is_spoken_to_only_when_asked(tmp_
             facts = await desk.until(name, lambda facts: facts["lost"])
             assert facts["position"] is None
             before = bytes(heard)
+            paused, sleep = asyncio.Event(), asyncio.sleep
+
+            async def told(seconds: float) -> None:
+                await sleep(seconds)
+                paused.set()
+
+            monkeypatch.setattr(asyncio, "sleep", told)
             with pytest.raises(UnitBusy, match="port is gone"):
                 await desk.units.unit_say(name, "V1")
-            await asyncio.sleep(0.3)  # three looks at the port
+            for _ in range(3):  # three times it could have looked at the port
+                paused.clear()
+                await paused.wait()
             assert (len(came), bytes(heard)) == (1, before)
             await desk.units.unit_again(name)
             assert not desk.facts(name)["lost"]

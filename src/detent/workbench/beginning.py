@@ -1,6 +1,7 @@
 """What the page Begin asks of the server: what can be opened, opening it, making a new cell, looking commands up."""
 
-from collections.abc import Callable
+import asyncio
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -31,6 +32,7 @@ class Beginning:
     def __init__(self, bench: "Bench", live: Live, folder: Folder, drafts: Drafts) -> None:
         """Cells are opened and saved in `folder`; `drafts` become those of the cell that is opened."""
         self._bench, self._folder, self._drafts = bench, folder, drafts
+        self._titles = Titles()
         for call in (
             self.places,
             self.open_place,
@@ -44,13 +46,19 @@ class Beginning:
 
     async def places(self) -> dict[str, object]:
         """What can be opened: models, examples with their titles, cells in the folder; which is open."""
+        examples, cells = await asyncio.to_thread(self._read)
         return {
             "open": self._bench.picture.target,
             "models": [[name, model.title] for name, model in catalogue.MODELS.items()],
-            "examples": [[EXAMPLE + name, title] for name, title in _cells(home())],
+            "examples": [[EXAMPLE + name, title] for name, title in examples],
             "folder": str(self._folder.root),
-            "cells": [list(cell) for cell in _cells(self._folder.root, self._folder.names((".toml",)))],
+            "cells": [list(cell) for cell in cells],
         }
+
+    def _read(self) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+        """The examples and the cells of the folder, with their titles."""
+        root = self._folder.root
+        return self._titles.of(home(), _examples()), self._titles.of(root, self._folder.names((".toml",)))
 
     async def open_place(self, place: Name) -> str:
         """Show another cell in place of the one that is shown: a model, an example, or a file of the folder.
@@ -68,25 +76,25 @@ class Beginning:
         return target
 
     def _example(self, name: str) -> Path:
-        if name not in dict(_cells(home())):
+        if name not in _examples():
             raise ValueError(f"there is no example {name!r}")
         return home() / name
 
     async def jacks(self) -> dict[str, dict[str, list[str]]]:
         """For each model, parts too, what wires lead from and to."""
-        return jacks()
+        return await asyncio.to_thread(jacks)
 
     async def fittings(self) -> dict[str, object]:
         """What units of a new cell can have: motors, by name; axes of each model that moves something, and programs."""
         return {
             "motors": list(MOTORS),
-            "axes": {name: _axes(name) for name in catalogue.MODELS},
+            "axes": await asyncio.to_thread(lambda: {name: _axes(name) for name in catalogue.MODELS}),
             "programs": [name for name, model in catalogue.MODELS.items() if model.language is not None],
         }
 
     async def new_cell(self, cell: NewCell, name: Name = "") -> str:
         """The cell file of what was chosen, for a file of that name. Raises ValueError with what is wrong."""
-        return cell.text(self._beside(name))
+        return await asyncio.to_thread(cell.text, self._beside(name))
 
     def _beside(self, name: str) -> Callable[[str], str]:
         """Reads files that a cell file of that name would name."""
@@ -95,7 +103,7 @@ class Beginning:
     async def save_cell(self, name: Name, cell: NewCell, over: bool = False) -> str:
         """Write a new cell into the folder, never over a file unless `over` says so. Returns its name."""
         name = name if name.endswith(".toml") else f"{name}.toml"
-        text = cell.text(self._beside(name))
+        text = await asyncio.to_thread(cell.text, self._beside(name))
         if self._folder.path(name).exists() and not over:
             raise FileExistsError(f"{name} is there already: give it another name, or say that it may be replaced")
         self._folder.write(name, text.encode())
@@ -115,14 +123,38 @@ def _axes(model: str) -> list[str]:
     return [axis for unit in cell.controllers().values() for axis in unit.axes]
 
 
-def _cells(root: Path, names: list[str] | None = None) -> list[tuple[str, str]]:
-    """The cell files below `root`, each with its title; of other files only those are looked at that say `units`."""
-    found = []
-    for name in names if names is not None else sorted(str(path.relative_to(root)) for path in root.rglob("*.toml")):
+def _examples() -> list[str]:
+    root = home()
+    return sorted(str(path.relative_to(root)) for path in root.rglob("*.toml"))
+
+
+class Titles:
+    """The titles of cell files, each read once for as long as it stays as it is: a folder may have hundreds."""
+
+    def __init__(self) -> None:
+        self._known: dict[Path, tuple[tuple[int, int], str | None]] = {}  # None: it is no cell
+
+    def of(self, root: Path, names: Iterable[str]) -> list[tuple[str, str]]:
+        """The files of `names` below `root` that are cells, each with its title, or its name."""
+        found = ((name, self._title(root / name)) for name in names)
+        return [(name, title or name) for name, title in found if title is not None]
+
+    def _title(self, path: Path) -> str | None:
         try:
-            text = read_text(root / name)
-            if "[units" in text:
-                found.append((name, parse(text, name).title or name))
-        except (OSError, ValueError):  # a Problem is a ValueError: it is told when it is opened
-            continue
-    return found
+            status = path.stat()
+            version = status.st_mtime_ns, status.st_size
+            known = self._known.get(path)
+            if known is None or known[0] != version:
+                known = self._known[path] = version, _title(path)
+            return known[1]
+        except OSError:
+            return None
+
+
+def _title(path: Path) -> str | None:
+    """The title of a cell file, "" without one; of others only those are looked at that say `units`. OSError."""
+    try:
+        text = read_text(path)
+        return parse(text, path.name).title if "[units" in text else None
+    except ValueError:  # a Problem, too: it is told when the file is opened
+        return None
