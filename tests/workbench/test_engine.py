@@ -17,6 +17,7 @@ from tests.workbench.patience import PATIENCE
 from detent.cell.description import Problem
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.ticks import MS, SECOND
+from detent.workbench.board import table
 from detent.workbench.client import Bench, BenchError
 from detent.workbench.engine import BASE, BATCH, LEAST_KEPT, keep
 from detent.workbench.messages import State
@@ -371,3 +372,19 @@ def test_what_a_unit_does_otherwise_than_one_may_think_is_marked_on_the_time_lin
         await bench.type("gs-c200", "K")
 
     play(scene, "gs-c200")
+
+
+def test_as_fast_as_it_goes_time_stands_while_nothing_is_due_and_says_so() -> None:
+    async def scene(bench: Bench) -> None:
+        unit = "gs-c200s"
+        assert not bench.state.idle
+        await bench.pace(None)
+        stood = await bench.until(lambda state: state.idle)
+        assert table(stood)["why"] == "nothing is due: at max, time stands until something is"
+        await bench.type(unit, "+1000")
+        state = await bench.until(lambda state: state.idle and state.units[unit].axes[""].position == 1000)
+        assert state.now > stood.now
+        await bench.hold()
+        assert (bench.state.idle, table(bench.state)["why"]) == (False, "by hand")
+
+    play(scene, "gs-c200s", straps=("CHS=low",))

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 PACES: Sequence[float | None] = (0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, None)
 """The notches of the pace, times real time; None: as fast as it goes."""
 
+IDLE = "nothing is due: at max, time stands until something is"
+
 LevelField = Annotated[Level, Field(ge=0, le=1)]
 PlaceField = Annotated[float, Field(allow_inf_nan=False)]
 Text = Annotated[str, Field(max_length=4096)]
@@ -64,7 +66,7 @@ def table(state: State) -> dict[str, Value]:
         "end": state.end,
         "pace": state.pace,
         "held": state.held,
-        "why": state.stopped_why,
+        "why": IDLE if state.idle and not state.stopped_why else state.stopped_why,
         "past": state.past,
         "faster": round(state.faster, 3),
         "late": round(state.lateness.most / MS, 2),

@@ -333,6 +333,7 @@ class Engine:
             faster=self._faster,
             real=self._real_state(),
             queue=self.waiting.queue,
+            idle=pace.free and not pace.held and history.cell.next_event() is None,
         )
 
     def _named_lines(self) -> list[tuple[str, Line]]:

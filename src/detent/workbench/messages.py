@@ -237,6 +237,7 @@ class State(NamedTuple):
     faster: float  # cell time per wall time, measured over the last second
     real: RealState | None = None  # of boards that are driven
     queue: tuple[Waits, ...] = ()  # what is sent when time goes on
+    idle: bool = False  # it goes as fast as it can, and nothing is due: its time stands until something is
 
     @property
     def past(self) -> bool:

@@ -172,7 +172,9 @@ def begun(window: Window) -> Window:
     for unit in ("bar", "drill"):  # the cell is shared with tests that stop its programs
         if window.get(f"u.{unit}.breaks"):
             window.call("program_breaks", unit, [])
+    window.page.evaluate("document.querySelector('.cell').dataset.old = 'yes'")
     window.call("restart")
+    window.until("() => document.querySelector('.cell:not([data-old])')")  # the page is drawn anew, forms and all
     window.until("() => detent.get('now') < 60e9 && !detent.get('past')")
     if window.get("held"):
         window.call("go")
