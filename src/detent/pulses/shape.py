@@ -1,6 +1,8 @@
 """What trains that differ only in their start share: segments, running sums, and arrays kept for next time."""
 
 from bisect import bisect_left
+from functools import cache
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from detent.pulses.laws import AnySegment
@@ -93,8 +95,7 @@ class Shape:
         np.add(kept[1][first - 1 : first - 1 + len(out)], whole, out)
 
     def _fill(self, out: Int64Array, first: int, start: Fixed) -> None:
-        from detent.pulses import filling, short
-
+        filling, short = _arrays()
         if len(out) == self.steps and short.fill(out, self.segments, self.before, start):
             return
         last = first + len(out) - 1
@@ -111,3 +112,11 @@ class Shape:
                 filling.fill(out[done : done + count], self.segments[i], n - self.before[i], start)
                 done += count
             i += 1
+
+
+@cache
+def _arrays() -> tuple[ModuleType, ModuleType]:
+    """What asks NumPy; loaded when the first array is asked for."""
+    from detent.pulses import filling, short
+
+    return filling, short

@@ -34,6 +34,14 @@ def _roots(gain: float, square: float, most: int) -> tuple[npt.NDArray[np.float6
     return both
 
 
+@lru_cache(maxsize=64)
+def _multiples(period: float, most: int) -> npt.NDArray[np.float64]:
+    """0 .. most periods; the same few speeds come again."""
+    multiples = _COUNTING[: most + 1] * period
+    multiples.flags.writeable = False
+    return multiples
+
+
 def fill(out: Int64Array, segments: Sequence[AnySegment], before: Sequence[int], start: Fixed) -> bool:
     """Write the ns of every pulse of a train; False if it is not short. `before`: the pulses before each segment."""
     if len(out) > MOST or len(segments) > SEGMENTS:
@@ -61,8 +69,7 @@ def fill(out: Int64Array, segments: Sequence[AnySegment], before: Sequence[int],
                 return False
             period = segment.numerator / segment.denominator
             part = estimate[done : done + last - first]
-            np.multiply(_COUNTING[first + 1 : last + 1], period, part)
-            np.add(part, anchor, part)
+            np.add(_multiples(period, 1 << last.bit_length())[first + 1 : last + 1], anchor, part)
             far = abs(anchor) + last * period
             done += last - first
         else:
