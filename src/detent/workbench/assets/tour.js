@@ -1,6 +1,6 @@
 // The guided tour: a few stops, dismissed with a key or a click, and remembered.
 
-const { part, remember, remembered } = window.detent;
+const { get, part, remember, remembered } = window.detent;
 
 const STOPS = [
   ["", "Welcome to the workbench", "A cell of controllers, as they stand now: running, ready, or waiting to be spoken to. Everything here is live, and everything can be taken back. Six short stops."],
@@ -10,6 +10,14 @@ const STOPS = [
   [".history", "Drag back", "The whole past is kept. Drag the time line back, and the cell is as it was then; press go, and it goes on from there. What had come after is kept as another future."],
   ["nav.tabs", "And further", "Program: write, load and step a stored program. Terminal: every byte on the lines, explained. Scope and Motion: what the axes do, exact to the pulse."],
 ];
+
+// where a machine hangs on real pins, some of this is otherwise
+const REAL = {
+  "Welcome to the workbench": "The controllers of a machine on real pins, as they stand now. What you do here is done there, and nothing of it is taken back; STOP, above every page, stops every board at once. Six short stops.",
+  "Switches, inputs, wires": "Click a strap or an input without a wire to change it. Inputs of a board have the level of their pins, and only a hand at the machine changes it.",
+  "Time obeys you": "The machine's time goes on. Pause lets the view stand, and single events can be looked at. Keys: space, comma and point.",
+  "Drag back": "The past is kept. Drag the time line back, and you see the cell as it was then; the machine goes on meanwhile. Press go, and you are at its present again.",
+};
 
 let box = null;
 let spot = null;
@@ -26,7 +34,7 @@ function show() {
   const [selector, title, text] = STOPS[at];
   const target = selector ? document.querySelector(selector) : null;
   box.querySelector("h2").textContent = title;
-  box.querySelector("p").textContent = text;
+  box.querySelector("p").textContent = (get("real") && REAL[title]) || text;
   box.querySelector(".count").textContent = `${at + 1} of ${STOPS.length}`;
   box.querySelector(".next").textContent = at + 1 < STOPS.length ? "Next" : "Done";
   box.querySelector(".before").style.visibility = at ? "visible" : "hidden";

@@ -85,7 +85,7 @@ everything stands; help lists what else it does. Click to copy">{escape(command)
     return f"""<section class="panel breaking" aria-label="Break it" data-part="breaking"
  data-kinds="{escape(json.dumps(kinds))}" data-helps="{escape(json.dumps(helps))}">
 <div class="panel-head"><h2>Break it</h2><span class="quiet grow">What a real cell does some day: every fault can be
-mended, and taken back on the time line.</span></div>
+mended<span class="unreal">, and taken back on the time line</span>.</span></div>
 <form class="row"><select class="field" name="kind" aria-label="What breaks">{options}</select>
 <select class="field" name="where" aria-label="Where"></select><span class="row more"></span>
 <label class="quiet">for <input class="field num" name="for" placeholder="until mended" aria-label="For how long"
