@@ -3,10 +3,24 @@
 /** Told when a key of the live table has another value, and at once for those that there are. Its end stops that. */
 type Heard = (key: string, value: any) => void;
 type End = () => void;
+type Setup = (element: Part) => End | void;
+
+/** An element of a page. Its script is written together with the page: what it looks for in its part is there. */
+type Part = {
+  querySelector(selector: string): Part;
+  querySelectorAll(selector: string): NodeListOf<Part>;
+  closest(selector: string): Part;
+  parentElement: Part;
+  firstElementChild: Part;
+  lastElementChild: Part;
+  dataset: Record<string, any>;
+  /** What is not of every element: `value`, `disabled`, `elements`, `showModal`... */
+  [name: string]: any;
+} & HTMLElement;
 
 interface Detent {
   /** Set up every element with `data-part="NAME"`, as it comes; what `setup` gives back is called when it is gone. */
-  part(name: string, setup: (element: any) => End | void): void;
+  part(name: string, setup: Setup): void;
   on(prefix: string, heard: Heard): End;
   /** Called after each change of the live table. */
   frame(drawn: () => void): End;
@@ -23,12 +37,133 @@ interface Detent {
   turning(): boolean;
   toast(text: string, kind?: "note" | "error"): void;
   theme(): "dark" | "light";
-  onTheme(heard: () => void): End;
+  onTheme(heard: (theme: "dark" | "light") => void): End;
   remembered(name: string): any;
   remember(name: string, value: any): void;
   seconds(ns: number | null | undefined): string;
   grouped(number: number): string;
   forms: Record<string, (value: any) => string>;
+}
+
+// -- what the pages Motion and Scope are told (detent/workbench/moves.py, scope_feed.py) --
+
+interface Setting {
+  name: string;
+  title: string;
+  unit: string;
+  low: number;
+  high: number;
+  scale: number;
+}
+
+/** An axis: its law and its settings. */
+interface About {
+  unit: string;
+  axis: string;
+  real: boolean;
+  model: string;
+  law: string;
+  units: string;
+  most: number;
+  steps: number;
+  settings: Setting[];
+  values: Record<string, number>;
+  options: Record<string, string>;
+  steppings: string[];
+  per_step: Record<string, number>;
+  stepping: string;
+  drives: string[];
+  motors: any[];
+  fitted: any;
+}
+
+/** A move drawn: at `times` in s the speed and the position; accelerations are [at, value]. */
+interface Move {
+  settings: string[];
+  go: string;
+  steps: number;
+  times: number[];
+  speeds: number[];
+  positions: number[];
+  accelerations: Point[];
+  /** ns */
+  duration: number;
+  peak: number;
+  mean: number;
+  up: number;
+  down: number;
+  reached: boolean;
+}
+
+type Point = [number, number];
+type Colour = (name: string) => string;
+
+/** What is seen of the time of a cell, in ns. */
+interface View {
+  begin: number;
+  end: number;
+}
+
+/** A trace of the catalogue. */
+interface Trace {
+  id: string;
+  unit: string;
+  name: string;
+  title: string;
+  lane: string;
+  shape: "line" | "step";
+  level: boolean;
+  units: string;
+}
+
+/** Traces above each other, `top` and `height` in px, `low` and `high` the ends of what they show. */
+interface Lane {
+  name: string;
+  level: boolean;
+  traces: (Trace & { index: number })[];
+  top: number;
+  height: number;
+  low: number;
+  high: number;
+}
+
+/** The columns of a trace: the least and the greatest value of each, more than `base`. */
+interface Columns {
+  id: string;
+  base: number;
+  low: Float32Array;
+  high: Float32Array;
+  values: [any, any];
+}
+
+interface Frame {
+  begin: number;
+  width: number;
+  first: number;
+  now: number;
+  from: number;
+  to: number;
+  trigger: number | null;
+  marks?: { at: number }[];
+  traces: Columns[];
+}
+
+// -- what the page Program is told (detent/workbench/editing.py) --
+
+/** A command as it is spelt, and what the table says of it. `whole`: no letter may follow. */
+interface Word {
+  spelling: string;
+  whole: boolean;
+  rows: Row[];
+}
+
+interface Row {
+  form: string;
+  takes: string;
+  what: string;
+  bytes: number;
+  section: string;
+  stored: boolean;
 }
 
 interface Window {

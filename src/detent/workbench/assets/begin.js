@@ -1,14 +1,22 @@
 // The page Begin: what can be opened, a new cell out of units and wires, the commands of a model.
 
+import { worded } from "./elements.js";
+
 const { part, call, toast, remembered, remember } = window.detent;
 
 part("begin", (box) => {
+  /** @param {string} name */
   const role = (name) => box.querySelector(`[data-role="${name}"]`);
+  /** @type {Record<string, Record<string, string[]>>} model -> the pins of each side, and its straps */
   let jacks = {};
+  /** @type {{motors: string[], axes: Record<string, string[]>, programs: string[]}} what can be fitted to a model */
   let fittings = { motors: [], axes: {}, programs: [] };
+  /** @type {{title: string, units: any[], wires: {source: string, target: string}[], switches: any[], motors: any[]}} */
   let cell = { title: "", units: [], wires: [], switches: [], motors: [] };
+  /** @type {Set<string>} */
   const open = new Set(); // units whose fittings are shown
-  let from = null; // the output that was clicked
+  /** @type {string | null} the output that was clicked */
+  let from = null;
   let armed = "";
   try {
     cell = { ...cell, ...JSON.parse(remembered("newcell") || "{}") };
@@ -16,15 +24,14 @@ part("begin", (box) => {
     /* begun anew */
   }
 
-  function element(tag, name, text) {
-    const made = document.createElement(tag);
-    if (name) made.className = name;
-    if (text !== undefined) made.textContent = text;
-    return made;
-  }
-
+  /**
+   * @param {string} name
+   * @param {string} text
+   * @param {() => void} action
+   * @param {string} [help]
+   */
   function button(name, text, action, help) {
-    const made = element("button", name, text);
+    const made = worded("button", name, text);
     made.type = "button";
     if (help) made.dataset.help = help;
     made.addEventListener("click", action);
@@ -33,6 +40,7 @@ part("begin", (box) => {
 
   // -- opening --
 
+  /** @param {string} place */
   async function openPlace(place) {
     toast("Opening\u2026");
     try {
@@ -46,16 +54,21 @@ part("begin", (box) => {
   async function places() {
     const told = await call("places").catch((error) => toast(error.message, "error"));
     if (!told) return;
+    /**
+     * @param {string} title
+     * @param {[string, string][]} list
+     * @param {string} none
+     */
     const group = (title, list, none) => {
-      const made = element("div", "group");
-      made.append(element("h3", "", title));
+      const made = worded("div", "group");
+      made.append(worded("h3", "", title));
       for (const [place, words] of list) {
         const one = button("key place", "", () => openPlace(place));
-        one.append(element("b", "", place.replace(/^example:/, "")), element("span", "quiet", words === place ? "" : words));
-        if (place === told.open) one.append(element("span", "open", "open"));
+        one.append(worded("b", "", place.replace(/^example:/, "")), worded("span", "quiet", words === place ? "" : words));
+        if (place === told.open) one.append(worded("span", "open", "open"));
         made.append(one);
       }
-      if (!list.length) made.append(element("p", "quiet", none));
+      if (!list.length) made.append(worded("p", "quiet", none));
       return made;
     };
     role("places").replaceChildren(
@@ -63,9 +76,9 @@ part("begin", (box) => {
       group("Models alone", told.models, ""),
       group("Examples", told.examples, "They are not installed here."),
     );
-    const unit = element("a", "key place", "");
+    const unit = worded("a", "key place", "");
     unit.href = "/unit";
-    unit.append(element("b", "", "A real unit"), element("span", "quiet", "at a port of this computer, or of another"));
+    unit.append(worded("b", "", "A real unit"), worded("span", "quiet", "at a port of this computer, or of another"));
     role("places").prepend(unit);
     find();
   }
@@ -78,6 +91,7 @@ part("begin", (box) => {
 
   // -- a new cell --
 
+  /** @param {string} text */
   const hint = (text) => (role("hint").textContent = text);
 
   function draw() {
@@ -85,13 +99,13 @@ part("begin", (box) => {
     const wires = new Map();
     for (const { source, target } of cell.wires) wires.set(source, [...(wires.get(source) || []), target]);
     for (const one of cell.switches) wires.set(one.name, [one.drives].filter(Boolean));
-    const board = element("div", "cell board");
+    const board = worded("div", "cell board");
     board.dataset.part = "wires";
     board.dataset.wires = JSON.stringify([...wires]);
     const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
     svg.classList.add("wires");
     svg.setAttribute("aria-hidden", "true");
-    const cards = element("div", "units");
+    const cards = worded("div", "units");
     board.append(svg, cards);
     for (const unit of cell.units) cards.append(card(unit));
     for (const one of cell.switches) cards.append(lever(one));
@@ -99,10 +113,12 @@ part("begin", (box) => {
     text();
   }
 
+  /** @param {any} unit */
   function card(unit) {
-    const made = element("section", "panel");
-    const head = element("div", "panel-head");
-    head.append(element("h3", "grow", unit.name), element("span", "quiet", unit.model), button("key small", "\u00d7", () => {
+    const made = worded("section", "panel");
+    const head = worded("div", "panel-head");
+    head.append(worded("h3", "grow", unit.name), worded("span", "quiet", unit.model), button("key small", "\u00d7", () => {
+      /** @param {string} end */
       const of = (end) => end.split(".")[0] === unit.name;
       cell.units = cell.units.filter((one) => one !== unit);
       cell.wires = cell.wires.filter((wire) => !of(wire.source) && !of(wire.target));
@@ -110,9 +126,9 @@ part("begin", (box) => {
       cell.motors = cell.motors.filter((one) => one.unit !== unit.name);
       draw();
     }, `Take ${unit.name} away`));
-    const pins = element("div", "jacks");
+    const pins = worded("div", "jacks");
     for (const side of ["in", "out"]) {
-      const column = element("div", side);
+      const column = worded("div", side);
       for (const pin of (jacks[unit.model] || {})[side] || []) column.append(jack(`${unit.name}.${pin}`, pin, side));
       pins.append(column);
     }
@@ -120,8 +136,13 @@ part("begin", (box) => {
     return made;
   }
 
+  /**
+   * @param {string} label
+   * @param {HTMLInputElement | HTMLSelectElement} made
+   * @param {(value: string) => void} changed
+   */
   function field(label, made, changed) {
-    const box = element("label", "quiet", `${label} `);
+    const box = worded("label", "quiet", `${label} `);
     made.className += " field";
     made.setAttribute("aria-label", label);
     made.addEventListener("change", () => {
@@ -132,28 +153,36 @@ part("begin", (box) => {
     return box;
   }
 
+  /**
+   * @param {string[]} values
+   * @param {string} chosen
+   */
   function choice(values, chosen) {
-    const made = element("select", "");
+    const made = worded("select", "");
     made.append(...values.map((value) => new Option(value || "\u2013", value)));
     made.value = chosen;
     return made;
   }
 
+  /** @param {any} value */
   function input(value, type = "text") {
-    const made = element("input", "mono");
+    const made = worded("input", "mono");
     made.type = type;
     if (type === "number") made.step = "any";
     made.value = value ?? "";
     return made;
   }
 
-  /** What a unit has besides its wires: straps, a program, a motor on each axis. */
+  /**
+   * What a unit has besides its wires: straps, a program, a motor on each axis.
+   * @param {any} unit
+   */
   function fitted(unit) {
-    const box = element("details", "fitted");
+    const box = worded("details", "fitted");
     box.open = open.has(unit.name);
     box.addEventListener("toggle", () => (box.open ? open.add(unit.name) : open.delete(unit.name)));
-    box.append(element("summary", "", "Straps, program, motor"));
-    const straps = element("div", "row wrap");
+    box.append(worded("summary", "", "Straps, program, motor"));
+    const straps = worded("div", "row wrap");
     unit.straps ||= {};
     for (const pin of (jacks[unit.model] || {}).straps || [])
       straps.append(field(pin, choice(["", "low", "high"], unit.straps[pin] || ""), (value) => {
@@ -164,7 +193,7 @@ part("begin", (box) => {
     if (fittings.programs.includes(unit.model)) box.append(field("Program (a file beside the cell)", input(unit.program), (value) => (unit.program = value)));
     for (const axis of fittings.axes[unit.model] || []) {
       const motor = cell.motors.find((one) => one.unit === unit.name && one.axis === axis);
-      const row = element("div", "row wrap");
+      const row = worded("div", "row wrap");
       row.append(field(`Motor ${axis}`.trim(), choice(["", ...fittings.motors], motor ? motor.motor : ""), (value) => {
         cell.motors = cell.motors.filter((one) => one !== motor);
         if (value) cell.motors.push({ supply: 24, lead: null, ...motor, unit: unit.name, axis, motor: value });
@@ -178,22 +207,28 @@ part("begin", (box) => {
     return box;
   }
 
+  /**
+   * @param {string} end
+   * @param {string} pin
+   * @param {string} side
+   */
   function jack(end, pin, side) {
     const used = cell.wires.some((wire) => wire.source === end || wire.target === end) || cell.switches.some((one) => one.drives === end);
     const made = button(`pin${used ? " wired" : ""}${from === end ? " lit" : ""}`, pin, () => click(end, side));
     made.dataset.jack = end;
     made.dataset.side = side === "in" ? "left" : "right";
     made.setAttribute("aria-label", `${side === "in" ? "Input" : "Output"} ${end}`);
-    made.append(element("i", "jack"));
+    made.append(worded("i", "jack"));
     return made;
   }
 
+  /** @param {any} one */
   function lever(one) {
-    const made = element("section", "panel");
-    const head = element("div", "panel-head");
+    const made = worded("section", "panel");
+    const head = worded("div", "panel-head");
     const out = jack(one.name, `switch ${one.name}`, "out");
     out.classList.add("wired");
-    head.append(out, element("span", "grow"), button("key small", `begins at ${one.level}`, () => {
+    head.append(out, worded("span", "grow"), button("key small", `begins at ${one.level}`, () => {
       one.level = one.level ? 0 : 1;
       draw();
     }), button("key small", "\u00d7", () => {
@@ -204,6 +239,10 @@ part("begin", (box) => {
     return made;
   }
 
+  /**
+   * @param {string} end
+   * @param {string} side
+   */
   function click(end, side) {
     if (side === "out") {
       from = from === end ? null : end;
@@ -222,10 +261,10 @@ part("begin", (box) => {
   }
 
   function list() {
-    const made = element("ul", "wirelist");
+    const made = worded("ul", "wirelist");
     for (const wire of cell.wires) {
-      const one = element("li", "", "");
-      one.append(element("span", "mono", `${wire.source} \u2192 ${wire.target} `), button("key small", "\u00d7", () => {
+      const one = worded("li", "", "");
+      one.append(worded("span", "mono", `${wire.source} \u2192 ${wire.target} `), button("key small", "\u00d7", () => {
         cell.wires = cell.wires.filter((other) => other !== wire);
         draw();
       }, "Take this wire away"));
@@ -255,6 +294,10 @@ part("begin", (box) => {
   }
 
   const ready = () => ({ ...cell, switches: cell.switches.filter((one) => one.drives) });
+  /**
+   * @param {string} base
+   * @param {string[]} taken
+   */
   const free = (base, taken) => {
     let name = base;
     for (let n = 2; taken.includes(name); n += 1) name = `${base}${n}`;
@@ -307,6 +350,7 @@ part("begin", (box) => {
 
   // -- commands --
 
+  /** @type {Record<string, string>[]} */
   let rows = [];
   async function commands() {
     rows = await call("command_reference", role("model").value).catch(() => []);
@@ -314,13 +358,13 @@ part("begin", (box) => {
   }
   function search() {
     const words = role("search").value.toLowerCase().split(/\s+/).filter(Boolean);
-    const found = rows.filter((row) => words.every((word) => Object.values(row).join(" ").toLowerCase().includes(word)));
+    const found = rows.filter((row) => words.every((/** @type {string} */ word) => Object.values(row).join(" ").toLowerCase().includes(word)));
     role("commands").replaceChildren(...found.map((row) => {
-      const made = element("tr", "");
-      made.append(element("td", "mono", `${row.command} ${row.argument}`), element("td", "", row.what), element("td", "quiet", row.section));
+      const made = worded("tr", "");
+      made.append(worded("td", "mono", `${row.command} ${row.argument}`), worded("td", "", row.what), worded("td", "quiet", row.section));
       return made;
     }));
-    if (!found.length) role("commands").append(element("tr", "quiet", "No command says that."));
+    if (!found.length) role("commands").append(worded("tr", "quiet", "No command says that."));
   }
   role("model").addEventListener("change", commands);
   role("search").addEventListener("input", search);

@@ -8,14 +8,15 @@ part("breaking", (box) => {
   const form = box.querySelector("form");
   const more = box.querySelector(".more");
   const list = box.querySelector(".standing");
+  /** @type {Record<string, string>} */
   const FIRST = { rate: "0.1", by: "50 ms", level: "0" };
 
   function choose() {
-    const [, , takes, places] = kinds.find(([name]) => name === form.elements.kind.value);
+    const [, , takes, places] = kinds.find((/** @type {any[]} */ [name]) => name === form.elements.kind.value);
     const before = form.elements.where.value;
-    form.elements.where.replaceChildren(...places.map((place) => new Option(place, place)));
+    form.elements.where.replaceChildren(...places.map((/** @type {string} */ place) => new Option(place, place)));
     if (places.includes(before)) form.elements.where.value = before;
-    more.replaceChildren(...takes.map((name) => {
+    more.replaceChildren(...takes.map((/** @type {string} */ name) => {
       const label = document.createElement("label");
       const field = document.createElement("input");
       label.className = "quiet";
@@ -33,6 +34,7 @@ part("breaking", (box) => {
   form.elements.kind.addEventListener("change", choose);
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
+    /** @type {Record<string, string>} */
     const given = {};
     for (const field of form.querySelectorAll("input")) if (field.value.trim()) given[field.name] = field.value.trim();
     try {
@@ -47,7 +49,7 @@ part("breaking", (box) => {
     const text = JSON.stringify(value);
     if (text === shown) return;
     shown = text;
-    list.replaceChildren(...(value || []).map(([number, words]) => {
+    list.replaceChildren(...(value || []).map((/** @type {[number, string]} */ [number, words]) => {
       const item = document.createElement("li");
       const what = document.createElement("span");
       const mend = document.createElement("button");
@@ -67,6 +69,6 @@ part("broken", (chip) => on("faults", (key, value) => {
   const count = (value || []).length;
   chip.hidden = !count;
   chip.textContent = count === 1 ? "1 fault: mend" : `${count} faults: mend`;
-  chip.dataset.help = `${(value || []).map(([, words]) => words).join("\n")}\nClick: mend all of it`;
+  chip.dataset.help = `${(value || []).map((/** @type {[number, string]} */ [, words]) => words).join("\n")}\nClick: mend all of it`;
   chip.onclick = () => action("mend", null);
 }));

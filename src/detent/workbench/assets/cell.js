@@ -27,18 +27,22 @@ part("slide", (box) => {
   const carriage = document.createElement("div");
   carriage.className = "carriage";
   box.append(canvas, carriage);
-  const pen = canvas.getContext("2d");
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   const flags = new Map();
   let place = 0;
   let low = -20;
   let high = 100;
   let planned = 0;
   let drawn = ""; // the scale that is on the page
-  let held = null; // the switch under a hand: [name, low, high]
+  /** @type {[string, number | null, number | null] | null} the switch under a hand: name, low, high */
+  let held = null;
 
   const width = () => Math.max(1, box.clientWidth - 2 * AIR);
+  /** @param {number} at */
   const x = (at) => AIR + ((at - low) / (high - low)) * width();
+  /** @param {number} px */
   const at = (px) => low + ((px - AIR) / width()) * (high - low);
+  /** @param {string} name */
   const range = (name) => (held && held[0] === name ? held.slice(1) : [get(`s.${name}.low`), get(`s.${name}.high`)]);
 
   /** The scale grows so that everything is on it, in steps that the eye can follow; it never shrinks. */
@@ -103,17 +107,28 @@ part("slide", (box) => {
     }
   }
 
+  /** @param {number} value */
   const round = (value) => (facts.whole ? Math.round(value) : Number(value.toFixed(3)));
 
   function plan() {
     if (!planned) planned = requestAnimationFrame(draw);
   }
 
+  /**
+   * @param {string} name
+   * @param {number} by
+   * @returns {[number | null, number | null]}
+   */
   function moved(name, by) {
     const [from, to] = [meant(`s.${name}.low`), meant(`s.${name}.high`)];
     return [from === null ? null : round(from + by), to === null ? null : round(to + by)];
   }
 
+  /**
+   * @param {string} name
+   * @param {number | null} from
+   * @param {number | null} to
+   */
   const put = (name, from, to) =>
     make(`s.${name}.low`, from, () => make(`s.${name}.high`, to, () => action("place_switch", name, from, to)));
 
@@ -166,7 +181,7 @@ part("slide", (box) => {
       place = value * facts.lead;
       plan();
     }),
-    ...facts.switches.map((name) => on(`s.${name}.`, plan)),
+    ...facts.switches.map((/** @type {string} */ name) => on(`s.${name}.`, plan)),
     onTheme(plan),
   ];
   const resized = new ResizeObserver(plan);
@@ -212,9 +227,9 @@ part("registers", (list) => {
       if (!shown.has(name)) {
         const row = document.createElement("div");
         row.append(document.createElement("dt"), document.createElement("dd"));
-        row.firstChild.textContent = name;
+        row.children[0].textContent = name;
         list.append(row);
-        shown.set(name, row.lastChild);
+        shown.set(name, row.children[1]);
       }
       shown.get(name).textContent = text;
     }
@@ -234,6 +249,7 @@ part("copy", (button) => {
 
 part("command", (form) => {
   const field = form.querySelector("input");
+  /** @type {string[]} */
   const past = [];
   let shown = 0;
   form.addEventListener("submit", async (event) => {

@@ -3,13 +3,24 @@
 
 import { niceStep, showNumber } from "./scope_plot.js";
 
+/**
+ * @typedef {{points: Point[], colour: string, width?: number, dash?: number[], fill?: boolean, label?: string}} Line
+ * @typedef {{right: number, top: number, bottom?: number, x: string, y: string, lines: Line[]}} Plotted the ends of the axes
+ *   (bottom is 0 unless given), their units, the lines
+ * @typedef {Plotted | {note: string}} Drawing a chart, or words in place of one
+ */
+
 const MARGIN = { left: 58, right: 14, top: 24, bottom: 24 };
 const ROUND = 11; // px: how high type is
 
-/* The size and the colours of a canvas that fills its parent, sharp on every screen, and wiped. */
+/**
+ * The size and the colours of a canvas that fills its parent, sharp on every screen, and wiped.
+ * @param {HTMLCanvasElement} canvas
+ * @param {CanvasRenderingContext2D} pen
+ */
 export function fitted(canvas, pen) {
   const ratio = window.devicePixelRatio || 1,
-    { clientWidth: width, clientHeight: height } = canvas.parentElement,
+    { clientWidth: width, clientHeight: height } = /** @type {Part} */ (canvas.parentElement),
     style = getComputedStyle(canvas);
   canvas.width = Math.round(width * ratio);
   canvas.height = Math.round(height * ratio);
@@ -17,24 +28,28 @@ export function fitted(canvas, pen) {
   canvas.style.height = `${height}px`;
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
-  return { width, height, colour: (name) => style.getPropertyValue(name).trim() };
+  return { width, height, colour: (/** @type {string} */ name) => style.getPropertyValue(name).trim() };
 }
 
 export class Chart {
+  /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    this.pen = canvas.getContext("2d");
+    this.pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    /** @type {Drawing | null} */
     this.what = null;
     this.watcher = new ResizeObserver(() => this.paint());
-    this.watcher.observe(canvas.parentElement);
+    this.watcher.observe(/** @type {Part} */ (canvas.parentElement));
   }
 
   close() {
     this.watcher.disconnect();
   }
 
-  /* Draw `what`: {right, top, bottom (ends of the axes; bottom is 0 unless given), x, y (units), lines: [{points:
-     [[x, y]], colour, width, dash, fill, label}]}, or {note}: words in place of a chart. */
+  /**
+   * Draw lines over two axes, or words in place of a chart.
+   * @param {Drawing} what
+   */
   draw(what) {
     this.what = what;
     this.paint();
@@ -44,21 +59,20 @@ export class Chart {
     const { canvas, pen, what } = this,
       { width, height, colour } = fitted(canvas, pen);
     if (!width || !height || !what) return;
-    const w = width - MARGIN.left - MARGIN.right,
-      h = height - MARGIN.top - MARGIN.bottom;
-    const x = (value) => MARGIN.left + (value / what.right) * w,
-      bottom = what.bottom || 0,
-      y = (value) => MARGIN.top + h - ((value - bottom) / (what.top - bottom)) * h;
     pen.font = `11px ${colour("--mono")}`;
     pen.lineWidth = 1;
-    if (what.note) {
-      // in place of a chart
+    if ("note" in what) {
       pen.fillStyle = colour("--ink-2");
       pen.textAlign = "center";
       pen.textBaseline = "middle";
       pen.fillText(what.note, width / 2, height / 2);
       return;
     }
+    const w = width - MARGIN.left - MARGIN.right,
+      h = height - MARGIN.top - MARGIN.bottom;
+    const x = (/** @type {number} */ value) => MARGIN.left + (value / what.right) * w,
+      bottom = what.bottom || 0,
+      y = (/** @type {number} */ value) => MARGIN.top + h - ((value - bottom) / (what.top - bottom)) * h;
     this.grid({ pen, colour, x, y, w, h, what });
     pen.save();
     pen.beginPath();
@@ -71,7 +85,7 @@ export class Chart {
       pen.strokeStyle = pen.fillStyle = colour(line.colour);
       if (line.fill) {
         pen.save();
-        pen.lineTo(x(line.points.at(-1)[0]), y(0));
+        pen.lineTo(x(line.points[line.points.length - 1][0]), y(0));
         pen.lineTo(x(line.points[0][0]), y(0));
         pen.globalAlpha = 0.12;
         pen.fill();
@@ -89,7 +103,10 @@ export class Chart {
     this.legend({ pen, colour, width, lines: what.lines });
   }
 
-  /* What each line is, above them from the right; what has no room is left out. */
+  /**
+   * What each line is, above them from the right; what has no room is left out.
+   * @param {{pen: CanvasRenderingContext2D, colour: Colour, width: number, lines: Line[]}} on
+   */
   legend({ pen, colour, width, lines }) {
     pen.textBaseline = "middle";
     pen.textAlign = "left";
@@ -112,6 +129,10 @@ export class Chart {
     }
   }
 
+  /**
+   * @param {{pen: CanvasRenderingContext2D, colour: Colour, x: (value: number) => number, y: (value: number) => number, w: number,
+   *   h: number, what: Plotted}} on
+   */
   grid({ pen, colour, x, y, w, h, what }) {
     const across = niceStep(what.right / Math.max(w / 86, 2)),
       bottom = what.bottom || 0,

@@ -3,10 +3,13 @@
 const { call, toast } = window.detent;
 const HELD = 300; // ms between two words that a key is held
 
-/** Make `buttons` run the unit `name()` at `rate(button)`, in steps/s with its sign, null for a rate that is none.
- *
- *  `sent(lines)` is told what was sent, `stopped(promise)` of the stop when the key is let go. Returns {letGo, end}:
- *  `letGo(stop)` lets go of a key that is held, and stops the axis unless `stop` is false; `end` is for the end of the page.
+/**
+ * Make `buttons` run the unit `name()` at `rate(button)`, in steps/s with its sign, null for a rate that is none.
+ * `sent(lines)` is told what was sent, `stopped(promise)` of the stop when the key is let go. Returns {letGo, end}:
+ * `letGo(stop)` lets go of a key that is held, and stops the axis unless `stop` is false; `end` is for the end of the page.
+ * @param {Part[]} buttons
+ * @param {{name: () => string, rate: (button: Part) => number | null, sent: (lines: string[]) => void,
+ *   stopped: (stopping: Promise<string>) => void}} told
  */
 export function holding(buttons, { name, rate, sent, stopped }) {
   let timer = 0;
@@ -20,6 +23,7 @@ export function holding(buttons, { name, rate, sent, stopped }) {
     if (stop) stopped(call("unit_stop", held));
   }
 
+  /** @param {Part} button */
   async function hold(button) {
     if (timer || button.disabled) return;
     const speed = rate(button);

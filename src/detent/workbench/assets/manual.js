@@ -7,12 +7,14 @@ const { part, on, get, call, toast, remembered, remember } = window.detent;
 part("manual", (box) => {
   const facts = JSON.parse(box.dataset.facts);
   const name = `${facts.name} (cell)`; // as the page Unit calls it, too
+  /** @param {string} one */
   const role = (one) => box.querySelector(`[data-role="${one}"]`);
   const measure = role("measure");
   if (measure) measure.value = remembered(`measure.${facts.name}`) || "mm";
   /** Steps in one unit of what is written. */
   const scale = () => (measure && measure.value ? 1 / facts.lead : 1);
 
+  /** @param {Part} field */
   function number(field) {
     const value = Number(field.value);
     if (field.value !== "" && Number.isFinite(value)) return value;
@@ -27,9 +29,12 @@ part("manual", (box) => {
     return call("unit_connect", facts.model, facts.address, facts.options, name);
   }
 
+  /** @param {string} text */
   const say = (text) => (role("sent").textContent = text);
+  /** @param {string[]} lines */
   const told = (lines) => say(lines.length ? `sent ${lines.join(", ")}` : "nothing had to be sent");
 
+  /** @param {string} what */
   async function move(what, value = 0) {
     try {
       await there();
@@ -39,6 +44,7 @@ part("manual", (box) => {
     }
   }
 
+  /** @param {Promise<string>} stopping */
   async function stopped(stopping) {
     hold.letGo(false);
     try {
@@ -61,7 +67,7 @@ part("manual", (box) => {
   role("stop").addEventListener("click", () => stopped(there().then(() => call("unit_stop", name))));
   const hold = holding([...box.querySelectorAll("[data-hold]")], {
     name: () => name,
-    rate: (button) => {
+    rate: (/** @type {Part} */ button) => {
       if (!get(`r.${name}`)) {
         there().then(() => toast("Connected: hold the key once more."), (error) => toast(error.message, "error"));
         return null;
@@ -74,6 +80,7 @@ part("manual", (box) => {
   });
   measure?.addEventListener("change", () => remember(`measure.${facts.name}`, measure.value));
 
+  /** @param {any} facts */
   function show(facts) {
     if (!facts) return;
     const busy = Boolean(facts.job || facts.lost || facts.stopping);
@@ -97,9 +104,10 @@ part("manual", (box) => {
 });
 
 part("compact", (button) => {
-  const cell = document.querySelector(".cell");
+  const cell = /** @type {Part} */ (document.querySelector(".cell"));
   const chosen = remembered("compact");
   const many = Number(button.dataset.units) >= Number(button.dataset.many);
+  /** @param {boolean} on */
   const set = (on) => {
     cell.classList.toggle("compact", on);
     button.setAttribute("aria-pressed", on ? "true" : "false");

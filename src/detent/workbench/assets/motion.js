@@ -7,19 +7,20 @@ import { MotorForm } from "./motion_form.js";
 import { Sending } from "./motion_sending.js";
 import { sliders } from "./motion_sliders.js";
 import { Tuning } from "./motion_tuning.js";
-import { element } from "./scope_tools.js";
+import { element } from "./elements.js";
 import { showNumber, showSpan } from "./scope_plot.js";
 
 const MOVE_AFTER = 25,
   JUDGE_AFTER = 180; // ms behind the last change
 const CHARTS = ["speed", "acceleration", "place", "torque"];
 
-class Motion {
+export class Motion {
+  /** @param {Part} root */
   constructor(root) {
     this.root = root;
-    this.find = (selector) => root.querySelector(selector);
+    this.find = (/** @type {string} */ selector) => root.querySelector(selector);
     this.charts = Object.fromEntries(
-      CHARTS.map((name) => [name, new Chart(this.find(`.motion-chart.${name} canvas`))]),
+      CHARTS.map((name) => [name, new Chart(/** @type {any} */ (this.find(`.motion-chart.${name} canvas`)))]),
     );
     this.form = new MotorForm(root, () => this.judgeLater());
     this.sending = new Sending(root, this);
@@ -27,14 +28,34 @@ class Motion {
     this.number = 0;
     this.version = 0; // of the settings; `drawn`: of those that `move` is of
     this.drawn = 0;
-    this.kept = null; // the move that is A
+    /** @type {any} the move that is A, with its settings and what was said of it */
+    this.kept = null;
+    /** @type {any} what the motor makes of the move, if that is known */
+    this.judged = null;
+    /** @type {{text: string, kind: string} | null} */
+    this.said = null;
+    /** @type {any} the axis: an About, once there is one */
+    this.about = null;
+    /** @type {Move | null} */
+    this.move = null;
+    this.steps = 1;
+    /** @type {Record<string, number>} */
+    this.values = {};
+    /** @type {Record<string, string>} */
+    this.options = {};
+    /** @type {any} */
+    this.tab = null;
+    /** @type {ReturnType<typeof sliders>} */
+    this.rows = [];
+    this.measure = "";
     this.root.addEventListener("click", (event) => {
-      const tab = event.target.closest("[role=tab]"),
-        key = event.target.closest("[data-key]");
+      const at = /** @type {Part} */ (event.target),
+        tab = at.closest("[role=tab]"),
+        key = at.closest("[data-key]");
       if (tab) this.show(tab);
-      else if (key && this.deeds[key.dataset.key]) this.deeds[key.dataset.key]();
+      else if (key && this.actions[key.dataset.key]) this.actions[key.dataset.key]();
     });
-    this.find(".motion-of").addEventListener("click", (event) => {
+    this.find(".motion-of").addEventListener("click", (/** @type {Event} */ event) => {
       event.preventDefault();
       this.find("#motion-motor").scrollIntoView({ block: "center" });
       this.find("select[name=motor]").focus();
@@ -63,11 +84,14 @@ class Motion {
 
   begin() {
     const last = detent.remembered("motion.axis");
-    const first = this.tabs.find((tab) => nameOf(tab.dataset) === last) || this.tabs[0];
+    const first = this.tabs.find((tab) => nameOf(/** @type {any} */ (tab.dataset)) === last) || this.tabs[0];
     if (first) this.show(first);
   }
 
-  /* The units that are connected stand behind those of the cell. */
+  /**
+   * The units that are connected stand behind those of the cell.
+   * @param {string[]} names
+   */
   realTabs(names) {
     const there = this.tabs.filter((tab) => tab.dataset.real);
     for (const tab of there) if (!names.includes(tab.dataset.unit)) tab.remove();
@@ -92,6 +116,7 @@ class Motion {
     if (this.about && this.about.real && !names.includes(this.about.unit) && this.tabs[0]) this.show(this.tabs[0]);
   }
 
+  /** @param {Part} tab */
   async show(tab, options = {}) {
     const { unit, axis, real } = tab.dataset;
     const about = await this.ask("motion_about", { unit, axis, real: Boolean(real), options });
@@ -101,7 +126,7 @@ class Motion {
     this.options = options;
     this.tab = tab;
     detent.remember("motion.axis", nameOf(about));
-    for (const one of this.tabs) one.setAttribute("aria-selected", one === tab);
+    for (const one of this.tabs) one.setAttribute("aria-selected", String(one === tab));
     this.find(".motion-law").textContent = about.law;
     this.find(".motion-told").textContent = "";
     this.values = { ...about.values };
@@ -122,7 +147,8 @@ class Motion {
     return { unit, axis, real, options: this.options };
   }
 
-  get wanted() {
+  /** What the server is asked about: the axis, its settings and the length of the move. */
+  get request() {
     return { ...this.place, values: this.values, steps: this.steps };
   }
 
@@ -138,7 +164,10 @@ class Motion {
     this.find(".motion-sliders").replaceChildren(...this.rows.map((row) => row.place));
   }
 
-  /* Settings that were found or picked: into the sliders, with the options that they need. */
+  /**
+   * Settings that were found or picked: into the sliders, with the options that they need.
+   * @param {{settings: Record<string, number>, options: Record<string, string>, part: Point}} found
+   */
   async take({ settings, options, part }) {
     const steps = Math.max(Math.round((this.steps * part[0]) / part[1]), 1);
     const sized = options.table !== undefined || part[0] !== part[1] ? options : this.options;
@@ -169,6 +198,7 @@ class Motion {
     this.showMeasure();
   }
 
+  /** @param {number} steps */
   perTurn(steps) {
     return steps * (this.about.per_step[this.form.stepping] || 1);
   }
@@ -222,7 +252,7 @@ class Motion {
     clearTimeout(this.moveSoon);
     const number = ++this.number,
       { version } = this,
-      move = await this.ask("motion_move", this.wanted);
+      move = await this.ask("motion_move", this.request);
     if (!move || this.closed || number !== this.number) return Boolean(move);
     this.move = move;
     this.drawn = version;
@@ -237,7 +267,7 @@ class Motion {
     if (burnt)
       this.find(".motion-told").textContent =
         "This table is no command: it is burnt into the drive's EPROM, or stands in the cell file as option table.";
-    this.root.dataset.drawn = number;
+    this.root.dataset.drawn = String(number);
     return true;
   }
 
@@ -252,10 +282,15 @@ class Motion {
       x = small ? "ms" : "s",
       t = small ? 1e3 : 1,
       right = seconds * t * 1.02;
+    /**
+     * @param {(move: Move) => Point[]} points
+     * @param {string} colour
+     */
     const lines = (points, colour) => [
       ...(kept ? [{ points: points(kept.move), colour: "--ink-3", dash: [6, 4], width: 1.5, label: "A" }] : []),
       { points: points(move), colour, fill: !kept, label: kept ? "this move" : "" },
     ];
+    /** @param {(one: Move) => number} of */
     const top = (of) => Math.max(...both.map(of)) || 1;
     this.charts.speed.draw({
       right,
@@ -263,16 +298,16 @@ class Motion {
       x,
       y: `${units}/s`,
       lines: lines(
-        (one) => [
+        /** @returns {Point[]} */ (one) => [
           [0, 0],
-          ...one.times.map((at, i) => [at * t, one.speeds[i] / by]),
+          ...one.times.map(/** @returns {Point} */ (at, i) => [at * t, one.speeds[i] / by]),
           [one.duration * 1e-9 * t, 0],
         ],
         "--trace-1",
       ),
     });
-    const most = top((one) => Math.max(0, ...one.accelerations.map(([, a]) => a))) / by,
-      least = Math.min(0, ...both.map((one) => Math.min(0, ...one.accelerations.map(([, a]) => a)))) / by;
+    const most = top((one) => Math.max(0, ...one.accelerations.map((/** @type {Point} */ point) => point[1]))) / by,
+      least = Math.min(0, ...both.map((one) => Math.min(0, ...one.accelerations.map((/** @type {Point} */ point) => point[1])))) / by;
     this.charts.acceleration.draw({
       right,
       top: most * 1.12,
@@ -288,13 +323,20 @@ class Motion {
       y: units,
       lines: lines((one) => one.times.map((at, i) => [at * t, one.positions[i] / by]), "--trace-2"),
     });
-    this.facts(most);
+    this.facts(move, most);
     this.both();
   }
 
-  facts(most) {
-    const { move } = this,
-      { by, unit: units } = this.scale;
+  /**
+   * @param {Move} move
+   * @param {number} most
+   */
+  facts(move, most) {
+    const { by, unit: units } = this.scale;
+    /**
+     * @param {number} value
+     * @param {number} figures
+     */
     const speed = (value, figures) => `${showNumber(+(value / by).toPrecision(figures))} ${units}/s`;
     const facts = {
       duration: showSpan(move.duration),
@@ -318,8 +360,14 @@ class Motion {
       { kept, move } = this;
     for (const key of ["swap", "drop"]) this.find(`[data-key=${key}]`).hidden = !kept;
     place.hidden = !kept;
-    if (!kept) return;
+    if (!kept || !move) return;
+    /** @param {Move} one */
     const speed = (one) => `${showNumber(+(one.peak / this.scale.by).toPrecision(5))} ${this.scale.unit}/s`;
+    /**
+     * @param {string} name
+     * @param {Move} one
+     * @param {any} verdict
+     */
     const row = (name, one, verdict, more = "") =>
       element(
         "tr",
@@ -365,12 +413,12 @@ class Motion {
     }
     const { torque } = this.charts;
     this.judging = true;
-    if (!torque.what || torque.what.note) torque.draw({ note: "Computing \u2026" });
+    if (!torque.what || "note" in torque.what) torque.draw({ note: "Computing \u2026" });
     this.root.toggleAttribute("data-judging", true);
     let found = null,
       words = "";
     try {
-      found = await detent.call("motion_motor", this.wanted, this.form.asked());
+      found = await detent.call("motion_motor", this.request, this.form.asked());
     } catch (error) {
       words = error.message;
     }
@@ -401,7 +449,7 @@ class Motion {
 
   paintTorque() {
     const { judged: found, kept } = this,
-      positive = (points) => points.map(([speed, torque]) => [speed, Math.max(torque, 0)]);
+      positive = (/** @type {Point[]} */ points) => points.map(/** @returns {Point} */ ([speed, torque]) => [speed, Math.max(torque, 0)]);
     const curve = positive(found.curve),
       before = kept && kept.judged ? kept.judged.asked : [];
     const all = [...curve, ...found.asked, ...before];
@@ -418,6 +466,10 @@ class Motion {
     });
   }
 
+  /**
+   * @param {string} text
+   * @param {string} kind
+   */
   verdict(text, kind) {
     const place = this.find(".motion-verdict");
     this.said = { text, kind };
@@ -428,7 +480,11 @@ class Motion {
 
   /* -- keys ---------------------------------------------------------------------------------------------------- */
 
-  get deeds() {
+  /**
+   * What the keys do, by their `data-key`.
+   * @returns {Record<string, () => any>}
+   */
+  get actions() {
     return {
       send: () => this.whenSendable("send", (move) => this.sending.settings(move.settings)),
       move: () => this.whenSendable("move", (move) => this.sending.move([...move.settings, move.go])),
@@ -456,17 +512,24 @@ class Motion {
       },
       csv: () => this.whenSettled(() => exported(this, "csv")),
       png: () => this.whenSettled(() => exported(this, "png")),
-      ...this.tuning.deeds,
+      ...this.tuning.actions,
     };
   }
 
-  /* What a key does, with the move that is meant and not with the one that was drawn last. */
+  /**
+   * What a key does, with the move that is meant and not with the one that was drawn last.
+   * @param {(move: Move) => any} act
+   */
   async whenSettled(act) {
     const move = await this.settled();
     if (move) await act(move);
   }
 
-  /* The same for what goes to a unit: nothing does if the settings that are meant are no commands. */
+  /**
+   * The same for what goes to a unit: nothing does if the settings that are meant are no commands.
+   * @param {string} key
+   * @param {(move: Move) => any} act
+   */
   async whenSendable(key, act) {
     const move = await this.settled();
     if (move && !this.find(`[data-key=${key}]`).disabled) await act(move);
@@ -477,6 +540,10 @@ class Motion {
     return { move, judged, verdict: said || {}, values: { ...this.values }, options: { ...this.options }, steps };
   }
 
+  /**
+   * @param {string} name
+   * @param {...any} values
+   */
   async ask(name, ...values) {
     try {
       return await detent.call(name, ...values);
@@ -487,6 +554,7 @@ class Motion {
   }
 }
 
+/** @param {{unit: string, axis: string, real?: any}} place */
 function nameOf({ unit, axis, real }) {
   return `${real ? "r:" : ""}${unit}.${axis}`;
 }

@@ -1,17 +1,24 @@
 /* The motor of the Motion page: which, with which drive, what it moves. `asked` is what the server takes (rigs.py). */
 
-import { element } from "./scope_tools.js";
+import { element } from "./elements.js";
 
 const NUMBERS = ["supply", "current", "inertia", "friction", "damping"],
   MOVED = ["size", "gear", "mass", "slope", "force", "drag"];
 
 export class MotorForm {
+  /**
+   * @param {Part} root
+   * @param {() => void} changed
+   */
   constructor(root, changed) {
     this.form = root.querySelector("form.motion-form");
     this.fields = this.form.elements;
     this.changed = changed;
-    this.own = null; // {name, text, curve, curve_name}
-    this.form.addEventListener("input", (event) => this.touched(event.target.name));
+    /** @type {{name: string, text: string, curve: string, curve_name: string, facts: any} | null} */
+    this.own = null;
+    /** @type {About | null} */
+    this.about = null;
+    this.form.addEventListener("input", (event) => this.touched(/** @type {any} */ (event.target).name));
     this.form.addEventListener("submit", (event) => event.preventDefault());
   }
 
@@ -23,9 +30,10 @@ export class MotorForm {
   get title() {
     const { motor } = this.fields;
     if (!motor.value) return "no motor chosen";
-    return `${motor.value === "fitted" ? this.about.fitted.name : motor.value === "own" ? this.own.name : motor.value}:`;
+    return `${motor.value === "fitted" ? this.about?.fitted.name : motor.value === "own" ? this.own?.name : motor.value}:`;
   }
 
+  /** @param {About} about */
   fill(about) {
     const { motors, fitted, drives } = about,
       { motor, drive } = this.fields;
@@ -47,6 +55,7 @@ export class MotorForm {
     this.takeMotor();
   }
 
+  /** @param {About} about */
   steppings(about) {
     const { stepping } = this.fields,
       before = stepping.value;
@@ -56,10 +65,9 @@ export class MotorForm {
   }
 
   get found() {
-    const { motor } = this.fields,
-      { fitted, motors } = this.about;
-    if (motor.value === "own") return this.own.facts;
-    return motor.value === "fitted" ? fitted : motors.find(({ name }) => name === motor.value);
+    const { motor } = this.fields;
+    if (motor.value === "own") return this.own?.facts;
+    return motor.value === "fitted" ? this.about?.fitted : this.about?.motors.find(({ name }) => name === motor.value);
   }
 
   takeMotor() {
@@ -68,14 +76,14 @@ export class MotorForm {
     for (const field of this.fields) if (!["motor", "files"].includes(field.name)) field.disabled = !found;
     const wirings = found && named ? found.wirings : [];
     fields.wiring.replaceChildren(
-      ...wirings.map((name) => element("option", { value: name }, name === found.wiring ? `${name} (as sold)` : name)),
+      ...wirings.map((/** @type {string} */ name) => element("option", { value: name }, name === found.wiring ? `${name} (as sold)` : name)),
     );
     if (found) fields.wiring.value = found.wiring || "";
     this.form.querySelector("[data-role=wiring]").hidden = !wirings.length;
     this.form.querySelector("[data-role=fit]").hidden = !(found && named && found.curve);
     fields.fit.checked = false;
     if (!found) return;
-    fields.stepping.value = found.stepping || this.about.stepping;
+    fields.stepping.value = found.stepping || this.about?.stepping;
     fields.supply.value = found.supply;
     fields.current.value = found.current;
     fields.inertia.value = +found.inertia.toPrecision(4);
@@ -83,6 +91,7 @@ export class MotorForm {
     fields.damping.value = found.damping;
   }
 
+  /** @param {string} name */
   async touched(name) {
     if (name === "files") await this.takeFiles([...this.fields.files.files]);
     if (name === "motor") {
@@ -95,7 +104,10 @@ export class MotorForm {
     this.changed();
   }
 
-  /* A motor of somebody's own: one TOML, and its curve if there is one. */
+  /**
+   * A motor of somebody's own: one TOML, and its curve if there is one.
+   * @param {File[]} files
+   */
   async takeFiles(files) {
     const toml = files.find((file) => file.name.endsWith(".toml")),
       csv = files.find((file) => file.name.endsWith(".csv"));
@@ -107,7 +119,7 @@ export class MotorForm {
       detent.toast("A file of a motor has at most 200 kB", "error");
       return;
     }
-    const own = { name: toml.name, text: await toml.text(), curve: csv ? await csv.text() : "", curve_name: csv ? csv.name : "" };
+    const own = { facts: null, name: toml.name, text: await toml.text(), curve: csv ? await csv.text() : "", curve_name: csv ? csv.name : "" };
     try {
       own.facts = await detent.call("motion_own", { name: own.name, text: own.text });
     } catch (error) {
@@ -126,8 +138,8 @@ export class MotorForm {
     const { fields, found } = this;
     if (!this.about || !found) return null;
     const motor = fields.motor.value,
-      number = (name) => [name, Number(fields[name].value)];
-    const { name, text, curve, curve_name } = this.own || {};
+      number = (/** @type {string} */ name) => [name, Number(fields[name].value)];
+    const { name, text, curve, curve_name } = this.own || { name: "", text: "", curve: "", curve_name: "" };
     return {
       motor: motor === "fitted" ? found.motor : motor,
       stepping: fields.stepping.value,

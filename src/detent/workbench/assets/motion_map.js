@@ -2,22 +2,33 @@
    star. A click, or the arrow keys and Enter, take a place over. */
 
 import { fitted } from "./chart.js";
+import { between, nearestOf, rgb, segments, shade, within } from "./contours.js";
 import { showNumber } from "./scope_plot.js";
 
 const MARGIN = { left: 58, right: 16, top: 26, bottom: 40 };
+/** @type {Record<string, Point>} */
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const LEVELS = 8; // lines of equal time
 const SHADES = ["--loss-0", "--loss-1", "--loss-2", "--loss-3"]; // none, some, most, all
 
 export class LossMap {
+  /**
+   * @param {Part} place
+   * @param {(x: number, y: number) => void} picked
+   */
   constructor(place, picked) {
     this.place = place;
     this.field = place.querySelector(".motion-map-field");
     this.canvas = place.querySelector("canvas");
     this.told = place.querySelector(".motion-map-told");
-    this.pen = this.canvas.getContext("2d");
+    this.pen = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d"));
     this.picked = picked;
+    /** @type {any} */
     this.map = null;
-    this.at = null; // [i, j] of the cell that is looked at
+    /** @type {Point | null} of the cell that is looked at */
+    this.at = null;
+    /** @type {{left: number, top: number, w: number, h: number} | null} */
+    this.box = null;
     this.watcher = new ResizeObserver(() => this.paint());
     this.watcher.observe(this.field);
     this.field.addEventListener("pointermove", (event) => this.look(this.under(event)));
@@ -34,7 +45,10 @@ export class LossMap {
     this.watcher.disconnect();
   }
 
-  /* Another map, or none. */
+  /**
+   * Another map, or none.
+   * @param {any} map
+   */
   take(map) {
     if (map === this.map) return;
     this.map = map;
@@ -44,13 +58,15 @@ export class LossMap {
     this.paint();
   }
 
+  /** @param {string} text */
   say(text) {
     this.told.textContent = text;
   }
 
+  /** @param {any} event */
   key(event) {
     if (!this.map) return;
-    const by = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    const by = ARROWS[event.key];
     if (by) {
       const [i, j] = this.at || this.nearest();
       this.look([within(i + by[0], this.map.x.length), within(j + by[1], this.map.y.length)]);
@@ -65,6 +81,7 @@ export class LossMap {
     if (at && map) this.picked(map.x[at[0]], map.y[at[1]]);
   }
 
+  /** @param {Point | null} cell */
   look(cell) {
     if (!this.map || !cell || (this.at && this.at[0] === cell[0] && this.at[1] === cell[1])) return;
     this.at = cell;
@@ -80,7 +97,11 @@ export class LossMap {
     this.paint();
   }
 
-  /* The cell under a pointer. */
+  /**
+   * The cell under a pointer.
+   * @param {MouseEvent} event
+   * @returns {Point | null}
+   */
   under(event) {
     if (!this.map || !this.box) return null;
     const edge = this.canvas.getBoundingClientRect(),
@@ -90,7 +111,10 @@ export class LossMap {
     return i >= 0 && j >= 0 && i < this.map.x.length && j < this.map.y.length ? [i, j] : null;
   }
 
-  /* The cell of what was found. */
+  /**
+   * The cell of what was found.
+   * @returns {Point}
+   */
   nearest() {
     const { x, y, chosen } = this.map;
     return [nearestOf(x, chosen[0]), nearestOf(y, chosen[1])];
@@ -101,7 +125,7 @@ export class LossMap {
   paint() {
     const { map, pen, canvas } = this;
     if (!map) return;
-    const { width, height, colour } = fitted(canvas, pen);
+    const { width, height, colour } = fitted(/** @type {any} */ (canvas), pen);
     if (!width || !height) return;
     const box = {
       left: MARGIN.left,
@@ -112,8 +136,8 @@ export class LossMap {
     this.box = box;
     const columns = map.x.length,
       rows = map.y.length,
-      cx = (i) => box.left + ((i + 0.5) / columns) * box.w,
-      cy = (j) => box.top + box.h - ((j + 0.5) / rows) * box.h,
+      cx = (/** @type {number} */ i) => box.left + ((i + 0.5) / columns) * box.w,
+      cy = (/** @type {number} */ j) => box.top + box.h - ((j + 0.5) / rows) * box.h,
       shades = SHADES.map((name) => rgb(colour(name)));
     for (let j = 0; j < rows; j++)
       for (let i = 0; i < columns; i++) {
@@ -139,9 +163,14 @@ export class LossMap {
     }
   }
 
+  /**
+   * @param {Colour} colour
+   * @param {(i: number) => number} cx
+   * @param {(j: number) => number} cy
+   */
   contours(colour, cx, cy) {
     const { map, pen } = this,
-      all = map.times.flat().filter((time) => time !== null);
+      all = map.times.flat().filter((/** @type {number | null} */ time) => time !== null);
     const low = Math.min(...all),
       high = Math.max(...all);
     if (!(high > low)) return;
@@ -149,6 +178,7 @@ export class LossMap {
     pen.font = `11px ${colour("--mono")}`;
     pen.textAlign = "center";
     pen.textBaseline = "middle";
+    /** @type {[number, number, string][]} */
     const places = [];
     for (let k = 1; k <= LEVELS; k++) {
       const level = low * (high / low) ** (k / (LEVELS + 1)),
@@ -168,6 +198,7 @@ export class LossMap {
     pen.lineWidth = 3;
     pen.strokeStyle = colour("--panel");
     pen.fillStyle = colour("--ink");
+    /** @type {Point[]} */
     const taken = [];
     for (const [x, y, text] of places) {
       if (taken.some(([a, b]) => Math.abs(a - x) < 52 && Math.abs(b - y) < 14)) continue;
@@ -177,6 +208,12 @@ export class LossMap {
     }
   }
 
+  /**
+   * @param {Colour} colour
+   * @param {(i: number) => number} cx
+   * @param {(j: number) => number} cy
+   * @param {any} box
+   */
   axes(colour, cx, cy, box) {
     const { map, pen } = this;
     pen.fillStyle = colour("--ink-2");
@@ -184,7 +221,7 @@ export class LossMap {
     pen.textAlign = "center";
     pen.textBaseline = "top";
     let right = -Infinity;
-    map.x.forEach((value, i) => {
+    map.x.forEach((/** @type {number} */ value, /** @type {number} */ i) => {
       const text = showNumber(value),
         half = pen.measureText(text).width / 2;
       if (cx(i) - half < right + 10 || cx(i) + half > box.left + box.w + 12) return;
@@ -194,7 +231,7 @@ export class LossMap {
     pen.textAlign = "right";
     pen.textBaseline = "middle";
     let last = Infinity;
-    map.y.forEach((value, j) => {
+    map.y.forEach((/** @type {number} */ value, /** @type {number} */ j) => {
       if (cy(j) > last - 16) return;
       last = cy(j);
       pen.fillText(showNumber(value), box.left - 6, cy(j));
@@ -218,6 +255,11 @@ export class LossMap {
     pen.fillText("lost 0", begin - 4, 12);
   }
 
+  /**
+   * @param {Colour} colour
+   * @param {(i: number) => number} cx
+   * @param {(j: number) => number} cy
+   */
   star(colour, cx, cy) {
     const { map, pen } = this,
       x = cx(between(map.x, map.chosen[0])),
@@ -235,53 +277,4 @@ export class LossMap {
     pen.stroke();
     pen.fill();
   }
-}
-
-const within = (value, count) => Math.min(Math.max(value, 0), count - 1);
-
-function nearestOf(values, wanted) {
-  return values.reduce((best, value, i) => (Math.abs(value - wanted) < Math.abs(values[best] - wanted) ? i : best), 0);
-}
-
-/* Where between the cells a value is; the cells are even in proportions. */
-function between(values, wanted) {
-  for (let i = 0; i + 1 < values.length; i++)
-    if (wanted <= values[i + 1]) return i + Math.log(Math.max(wanted, values[i]) / values[i]) / Math.log(values[i + 1] / values[i]);
-  return values.length - 1;
-}
-
-/* The pieces of the line on which a field of numbers has `level`, between the middles of its cells. */
-export function segments(rows, level) {
-  const found = [];
-  for (let j = 0; j + 1 < rows.length; j++)
-    for (let i = 0; i + 1 < rows[j].length; i++) {
-      const corners = [
-        [i, j, rows[j][i]],
-        [i + 1, j, rows[j][i + 1]],
-        [i + 1, j + 1, rows[j + 1][i + 1]],
-        [i, j + 1, rows[j + 1][i]],
-      ];
-      if (corners.some(([, , value]) => value === null)) continue;
-      const crossed = [];
-      corners.forEach(([x, y, value], k) => {
-        const [x2, y2, value2] = corners[(k + 1) % 4];
-        if (value < level === value2 < level) return;
-        const part = (level - value) / (value2 - value);
-        crossed.push([x + part * (x2 - x), y + part * (y2 - y)]);
-      });
-      for (let k = 0; k + 1 < crossed.length; k += 2) found.push([crossed[k], crossed[k + 1]]);
-    }
-  return found;
-}
-
-function rgb(text) {
-  const value = parseInt(text.replace("#", ""), 16);
-  return [value >> 16, (value >> 8) & 255, value & 255];
-}
-
-function shade(shades, part) {
-  const at = Math.min(part, 1) * (shades.length - 1),
-    k = Math.min(Math.floor(at), shades.length - 2);
-  const mixed = shades[k].map((value, n) => Math.round(value + (at - k) * (shades[k + 1][n] - value)));
-  return `rgb(${mixed.join(",")})`;
 }

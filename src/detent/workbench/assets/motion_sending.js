@@ -1,15 +1,19 @@
 /* What goes to the unit, from the Motion page: typed to the unit of the cell, or said to one that is connected. For
    that, and for what was found by a search, the lines are shown first. */
 
-import { element } from "./scope_tools.js";
+import { element } from "./elements.js";
 
 export class Sending {
+  /**
+   * @param {Part} root
+   * @param {import("./motion.js").Motion} motion
+   */
   constructor(root, motion) {
     this.motion = motion;
     this.told = root.querySelector(".motion-told");
     this.dialog = root.querySelector(".motion-dialog");
     this.dialog.addEventListener("click", (event) => {
-      const key = event.target.closest("button");
+      const key = /** @type {Part} */ (event.target).closest("button");
       if (key) this.dialog.close(key.value);
     });
     this.dialog.addEventListener("close", () => {
@@ -19,17 +23,23 @@ export class Sending {
     });
   }
 
+  /** @param {string[]} lines */
   async settings(lines, words = "") {
     const { about } = this.motion;
     if (about.real && !(await this.shown(about, lines, words))) return;
     await this.send(about, lines);
   }
 
+  /** @param {string[]} lines */
   async move(lines) {
     await this.settings(lines, "The motor moves.");
   }
 
-  /* Show the lines with what is to be known of them; whether they shall be sent to the unit of `about`. */
+  /**
+   * Show the lines with what is to be known of them; whether they shall be sent to the unit of `about`.
+   * @param {About} about
+   * @param {string[]} lines
+   */
   shown(about, lines, words = "") {
     const { dialog } = this,
       { unit, model, real } = about;
@@ -44,9 +54,12 @@ export class Sending {
     });
   }
 
-  /* Line by line, to the unit that they were shown for, whatever the page shows by now; nothing follows a line that is
-     refused. */
-  async send({ unit, real }, lines) {
+  /**
+   * Line by line, to the unit that they were shown for, whatever the page shows by now; nothing follows a line that is
+   * refused.
+   * @param {string[]} lines
+   */
+  async send(/** @type {About} */ { unit, real }, lines) {
     const sent = [];
     for (const line of lines) {
       if (real) {
@@ -60,6 +73,11 @@ export class Sending {
     return true;
   }
 
+  /**
+   * @param {string[]} sent
+   * @param {string} line
+   * @param {string} what
+   */
   tell(sent, line, what) {
     this.told.textContent = `${line} ${what}; ${sent.length ? `sent before it: ${sent.join(", ")}` : "nothing was sent before it"}`;
     return false;

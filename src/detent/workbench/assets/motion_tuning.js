@@ -2,8 +2,9 @@
    The search itself runs on the server (detent/workbench/tuning.py), and goes on when this page is left. */
 
 import { LossMap } from "./motion_map.js";
-import { element } from "./scope_tools.js";
+import { element } from "./elements.js";
 
+/** @type {Record<string, string>} */
 const STATES = {
   searching: "searching",
   mapping: "found; the map is being made",
@@ -13,13 +14,17 @@ const STATES = {
 };
 
 export class Tuning {
+  /**
+   * @param {Part} root
+   * @param {import("./motion.js").Motion} motion
+   */
   constructor(root, motion) {
     this.motion = motion;
     this.panel = root.querySelector(".motion-tuning");
-    this.find = (selector) => this.panel.querySelector(selector);
+    this.find = (/** @type {string} */ selector) => this.panel.querySelector(selector);
     this.form = this.find("form");
     this.map = new LossMap(this.find(".motion-map"), (x, y) => this.pick(x, y));
-    this.form.addEventListener("submit", (event) => {
+    this.form.addEventListener("submit", (/** @type {Event} */ event) => {
       event.preventDefault();
       this.search();
     });
@@ -42,7 +47,6 @@ export class Tuning {
     field.oninput = () => {
       field.dataset.touched = "yes";
     };
-    this.picked = null;
     this.soon();
   }
 
@@ -91,27 +95,35 @@ export class Tuning {
 
   /* -- what was found -------------------------------------------------------------------------------------------- */
 
+  /** @param {any} found */
   showFound(found) {
     this.found = found;
     this.find(".motion-found").hidden = !found;
     if (!found || found === this.shown) return;
     this.shown = found;
-    const lines = [...found.commands, ...found.option_lines.map((line) => `option ${line}`)];
+    const lines = [...found.commands, ...found.option_lines.map((/** @type {string} */ line) => `option ${line}`)];
     this.find(".motion-found-lines").replaceChildren(...lines.map((line) => element("span", {}, line)));
     this.find("[data-key=send-found]").disabled = !found.commands.length;
+    /** @param {number | undefined} value */
     const seconds = (value) => (value === undefined ? "" : `${value.toFixed(4)} s`);
     const rivals = [
-      ["found", (k) => found.moves[k].time_s, found.time_s],
-      ...(found.hand ? [["by hand", (k) => found.hand.moves_s[k], found.hand.time_s]] : []),
+      ["found", (/** @type {number} */ k) => found.moves[k].time_s, found.time_s],
+      ...(found.hand ? [["by hand", (/** @type {number} */ k) => found.hand.moves_s[k], found.hand.time_s]] : []),
       ...(found.hand_safe && found.hand && found.hand_safe.words !== found.hand.words
-        ? [["by hand, made safe", (k) => found.hand_safe.moves_s[k], found.hand_safe.time_s]]
+        ? [["by hand, made safe", (/** @type {number} */ k) => found.hand_safe.moves_s[k], found.hand_safe.time_s]]
         : []),
-      ["bound", (k) => found.moves[k].bound_s.worst, found.bound_s],
+      ["bound", (/** @type {number} */ k) => found.moves[k].bound_s.worst, found.bound_s],
     ];
-    const cell = (text, kind = "td") => element(kind, kind === "th" ? { scope: "col" } : {}, text);
+    /** @param {string} text */
+    const cell = (text, kind = /** @type {"td" | "th"} */ ("td")) => element(kind, kind === "th" ? { scope: "col" } : {}, text);
+    /**
+     * @param {string} name
+     * @param {string} sent
+     * @param {any[]} values
+     */
     const row = (name, sent, values) =>
       element("tr", {}, element("th", { scope: "row" }, name), cell(sent), ...values.map((value) => cell(seconds(value))));
-    const body = found.moves.map((move, k) =>
+    const body = found.moves.map((/** @type {any} */ move, /** @type {number} */ k) =>
       row(
         move.weight === 1 ? `${move.steps}` : `${move.steps} \u00d7${move.weight}`,
         move.go,
@@ -139,11 +151,15 @@ export class Tuning {
     this.find(".motion-known").textContent = known.join("");
   }
 
+  /**
+   * @param {number} x
+   * @param {number} y
+   */
   async pick(x, y) {
     const picked = await this.motion.ask("tuning_pick", x, y);
     if (!picked) return false;
     await this.motion.take(picked);
-    const times = picked.times.map((time) => `${time.toFixed(4)} s`).join(", ");
+    const times = picked.times.map((/** @type {number} */ time) => `${time.toFixed(4)} s`).join(", ");
     this.map.say(`taken over: ${picked.settings_words}: ${times}`);
     return true;
   }
@@ -157,7 +173,7 @@ export class Tuning {
       return;
     }
     const { moves, variants, corners, map, vary } = form.elements;
-    await motion.ask("tuning_begin", motion.wanted, asked, {
+    await motion.ask("tuning_begin", motion.request, asked, {
       moves: moves.value,
       variants: Number(variants.value),
       corners: corners.checked,
@@ -171,7 +187,8 @@ export class Tuning {
     return this.map.map ? this.map.canvas : null;
   }
 
-  get deeds() {
+  /** What the keys do, by their `data-key`. */
+  get actions() {
     return {
       "stop-search": () => this.motion.ask("tuning_stop"),
       take: () => this.motion.take(this.found),

@@ -6,21 +6,35 @@ import { makeEditor } from "./program_editor.js";
 const CHECK_AFTER = 180,
   KEEP_AFTER = 400; // ms behind the last change
 
+/** @type {Record<string, string>} */
 const KEYS = { F9: "break", F10: "step", "Shift-F10": "back", F4: "cursor" }; // F8 is everywhere: workbench.js
 
 class Program {
+  /** @param {Part} root */
   constructor(root) {
     this.root = root;
+    /** @type {any} what `program_about` gave */
     this.facts = null;
     this.file = "";
     this.saved = ""; // the text as it is in the file, or in the cell's own source
+    /** @type {any} what `program_check` gave */
     this.checked = null;
-    this.different = []; // lines that memory has otherwise
+    /** @type {number[]} lines that memory has otherwise */
+    this.different = [];
+    /** @type {(End | void)[]} */
     this.ends = [];
+    /** @type {any} an Editor, once it is open */
+    this.editor = null;
+    /** @type {Map<number, number>} address -> line */
+    this.lines = new Map();
+    /** @type {Map<number, number>} line -> address */
+    this.addresses = new Map();
+    this.ahead = false; // breakpoints were set in a text that is not loaded yet
+    this.how = ""; // what was shown of a script
     this.showing = 0; // counts the units that were asked for: the last one counts
     this.shown = Promise.resolve(); // the one that is asked for stands there
     this.seen = ""; // of what the running line was shown for
-    const find = (selector) => root.querySelector(selector);
+    const find = (/** @type {string} */ selector) => root.querySelector(selector);
     this.at = {
       file: find(".program-file"),
       errors: find(".program-errors"),
@@ -41,8 +55,8 @@ class Program {
 
   async open() {
     this.editor = await makeEditor(this.root.querySelector(".program-editor"), {
-      changed: (typed) => this.changed(typed),
-      toggled: (line) => this.press(() => this.toggleBreakpoint(line)),
+      changed: (/** @type {boolean} */ typed) => this.changed(typed),
+      toggled: (/** @type {number} */ line) => this.press(() => this.toggleBreakpoint(line)),
       keys: {
         "Mod-s": () => this.press(() => this.actions.save()),
         "Mod-Enter": () => this.press(() => (this.facts.language ? this.actions.run() : this.actions.send())),
@@ -59,11 +73,15 @@ class Program {
     if (units.length) this.turnTo(units.includes(last) ? last : units[0]);
   }
 
+  /** @param {string} unit */
   turnTo(unit) {
     this.shown = this.show(unit);
   }
 
-  /* A key was pressed: it acts on the unit that is asked for, once that is there. */
+  /**
+   * A key was pressed: it acts on the unit that is asked for, once that is there.
+   * @param {() => any} action
+   */
   async press(action) {
     await this.shown;
     if (this.facts && !this.closed) await action();
@@ -71,6 +89,7 @@ class Program {
 
   /* The keys of the page, wherever the focus is; in the editor they are its own. */
   listenForKeys() {
+    /** @param {any} event */
     const pressed = (event) => {
       if (event.defaultPrevented || event.altKey || this.at.dialog.open) return;
       if (event.target.closest && event.target.closest("[role=dialog]")) return;
@@ -93,6 +112,7 @@ class Program {
 
   /* -- the unit and its text -------------------------------------------------------------------------------- */
 
+  /** @param {string} unit */
   async show(unit) {
     const mine = (this.showing += 1);
     delete this.root.dataset.checked;
@@ -106,7 +126,7 @@ class Program {
     this.facts = facts;
     detent.remember("program.unit", unit);
     for (const tab of this.root.querySelectorAll("[data-unit]"))
-      tab.setAttribute("aria-selected", tab.dataset.unit === unit);
+      tab.setAttribute("aria-selected", String(tab.dataset.unit === unit));
     for (const watch of this.root.querySelectorAll("[data-watch]")) watch.hidden = watch.dataset.watch !== unit;
     for (const box of this.root.querySelectorAll("[data-for]"))
       box.hidden = (box.dataset.for === "language") !== facts.language;
@@ -134,8 +154,8 @@ class Program {
   commands() {
     const box = this.root.querySelector(".program-commands"),
       wanted = box.querySelector("input").value.toLowerCase().split(/\s+/).filter(Boolean),
-      rows = [...new Map(this.facts.words.flatMap((word) => word.rows).map((row) => [JSON.stringify(row), row])).values()],
-      found = rows.filter((row) => wanted.every((word) => [row.form, row.takes, row.what, row.section].join(" ").toLowerCase().includes(word)));
+      rows = [...new Map(this.facts.words.flatMap((/** @type {Word} */ word) => word.rows).map((/** @type {Row} */ row) => [JSON.stringify(row), row])).values()],
+      found = rows.filter((row) => wanted.every((/** @type {string} */ word) => [row.form, row.takes, row.what, row.section].join(" ").toLowerCase().includes(word)));
     box.querySelector("table").replaceChildren(
       ...found.map((row) => {
         const made = document.createElement("tr");
@@ -151,6 +171,7 @@ class Program {
     if (!found.length) box.querySelector("table").append("No command says that.");
   }
 
+  /** @param {boolean} typed */
   changed(typed) {
     if (!this.facts) return;
     this.different = [];
@@ -198,11 +219,11 @@ class Program {
     const first = this.checked === null || (found.loaded && !this.checked.loaded);
     this.checked = found;
     this.memory = detent.get(`u.${unit}.memory`);
-    this.lines = new Map(found.places.map(([line, address]) => [address, line]));
-    this.addresses = new Map(found.places.map(([line, address]) => [line, address]));
+    this.lines = new Map(found.places.map((/** @type {Point} */ [line, address]) => [address, line]));
+    this.addresses = new Map(found.places.map((/** @type {Point} */ [line, address]) => [line, address]));
     this.editor.check(found);
     this.at.errors.replaceChildren(
-      ...found.errors.map(([line, column, , message]) => {
+      ...found.errors.map((/** @type {[number, number, number, string]} */ [line, column, , message]) => {
         const button = document.createElement("button"),
           item = document.createElement("li"),
           where = document.createElement("b");
@@ -216,7 +237,7 @@ class Program {
     );
     const part = found.used / found.capacity;
     this.at.used.textContent = `${found.used} of ${found.capacity} bytes`;
-    this.at.meter.style.setProperty("--part", Math.min(part, 1));
+    this.at.meter.style.setProperty("--part", String(Math.min(part, 1)));
     this.at.meter.setAttribute("aria-valuenow", found.used);
     this.at.meter.setAttribute("aria-valuemax", found.capacity);
     this.at.meter.classList.toggle("full", part > 1);
@@ -241,7 +262,7 @@ class Program {
   look() {
     if (!this.facts || this.closed) return;
     const key = `u.${this.facts.unit}`,
-      get = (name) => detent.get(`${key}.${name}`);
+      get = (/** @type {string} */ name) => detent.get(`${key}.${name}`);
     this.registers();
     this.script();
     const held = detent.get("held"),
@@ -310,9 +331,9 @@ class Program {
     this.ahead = false;
     this.editor.breakAt(
       addresses
-        .map((address) => this.lines.get(address))
+        .map((/** @type {number} */ address) => this.lines.get(address))
         .filter(Boolean)
-        .sort((a, b) => a - b),
+        .sort((/** @type {number} */ a, /** @type {number} */ b) => a - b),
     );
   }
 
@@ -320,42 +341,51 @@ class Program {
     return `u.${this.facts.unit}.breaks`;
   }
 
-  /* Somebody wants a breakpoint at a line, or its instruction, or none where one is. */
+  /**
+   * Somebody wants a breakpoint at a line, or its instruction, or none where one is.
+   * @param {number} line
+   */
   toggleBreakpoint(line) {
     if (!this.facts.language) return;
     const place = this.placed(line),
       { breakLines } = this.editor;
     if (!this.checked || !this.checked.loaded || place === undefined) {
       const at = breakLines.includes(place) ? place : line;
-      this.setBreakpoints(breakLines.includes(at) ? breakLines.filter((other) => other !== at) : [...breakLines, at]);
+      this.setBreakpoints(breakLines.includes(at) ? breakLines.filter((/** @type {number} */ other) => other !== at) : [...breakLines, at]);
       return;
     }
     const { unit } = this.facts,
       address = this.addresses.get(place),
       before = detent.meant(this.breaksKey) || [],
       on = !before.includes(address),
-      after = on ? [...before, address].sort((a, b) => a - b) : before.filter((other) => other !== address);
+      after = on ? [...before, address].sort((a, b) => a - b) : before.filter((/** @type {number} */ other) => other !== address);
     detent.make(this.breaksKey, after, () => this.ask("program_breakpoint", unit, address, on));
     this.takeBreakpoints();
   }
 
-  /* The line of the instruction at this line, or of the next one behind it. */
+  /**
+   * The line of the instruction at this line, or of the next one behind it.
+   * @param {number} line
+   */
   placed(line) {
-    return this.addresses && [...this.addresses.keys()].sort((a, b) => a - b).find((place) => place >= line);
+    return [...this.addresses.keys()].sort((a, b) => a - b).find((place) => place >= line);
   }
 
-  /* These lines, and no others, have breakpoints from now on: those on no instruction go to the next one. */
+  /**
+   * These lines, and no others, have breakpoints from now on: those on no instruction go to the next one.
+   * @param {number[]} lines
+   */
   setBreakpoints(lines) {
     if (!this.checked || !this.facts.language) {
       this.editor.breakAt([]);
       return;
     }
-    const moved = [...new Set(lines.map((line) => this.placed(line)).filter(Boolean))].sort((a, b) => a - b);
+    const moved = [...new Set(lines.flatMap((line) => this.placed(line) ?? []))].sort((a, b) => a - b);
     this.editor.breakAt(moved);
     this.ahead = !this.checked.loaded; // set in a text that is not loaded yet
     if (this.ahead) this.say("Breakpoints are in force once this text is loaded.");
     else {
-      const addresses = moved.map((line) => this.addresses.get(line)).sort((a, b) => a - b),
+      const addresses = moved.flatMap((line) => this.addresses.get(line) ?? []).sort((a, b) => a - b),
         { unit } = this.facts;
       detent.make(this.breaksKey, addresses, () => this.ask("program_breaks", unit, addresses));
       this.takeBreakpoints();
@@ -364,9 +394,11 @@ class Program {
 
   /* -- what the keys do ------------------------------------------------------------------------------------------- */
 
+  /** @returns {Record<string, () => any>} by their `data-key` */
   get actions() {
     const { facts, editor } = this,
       unit = facts && facts.unit;
+    /** @param {boolean} start */
     const load = async (start) => {
       const lines = editor.breakLines,
         told = await this.ask("program_load", unit, editor.text, start);
@@ -375,6 +407,7 @@ class Program {
       await this.check();
       if (this.checked && this.checked.loaded) this.setBreakpoints(lines);
     };
+    /** @param {boolean} kept */
     const compare = async (kept) => {
       const found = await this.ask("program_compare", unit, editor.text, kept);
       if (!found) return;
@@ -404,7 +437,7 @@ class Program {
         this.say(changed ? "As it was. Ctrl-Z in the text brings back what you had written." : "Nothing was changed.");
       },
       open: () =>
-        this.chooseFile("Open", "Open", async (name) => {
+        this.chooseFile("Open", "Open", async (/** @type {string} */ name) => {
           const text = await this.ask("read_file", name);
           if (text === undefined) return false;
           if (this.facts !== facts) return true;
@@ -413,7 +446,7 @@ class Program {
           return true;
         }),
       save: () =>
-        this.chooseFile("Save in the chosen folder", "Save", async (name, over) => {
+        this.chooseFile("Save in the chosen folder", "Save", async (/** @type {string} */ name, /** @type {boolean} */ over) => {
           const text = editor.text,
             told = await this.ask("write_file", name, text, name === this.file ? this.saved : null, over);
           if (told === undefined) return false;
@@ -448,7 +481,11 @@ class Program {
     };
   }
 
-  /* Another text in place of this one; it is kept as a draft. */
+  /**
+   * Another text in place of this one; it is kept as a draft.
+   * @param {string} text
+   * @param {string} file
+   */
   replace(text, file) {
     this.file = file;
     this.editor.set(text);
@@ -457,6 +494,11 @@ class Program {
     this.name();
   }
 
+  /**
+   * @param {string} title
+   * @param {string} word
+   * @param {(name: string, over: boolean) => Promise<boolean | string>} action
+   */
   async chooseFile(title, word, action) {
     const names = await this.ask("files", []);
     if (!names) return;
@@ -478,7 +520,7 @@ class Program {
     settle();
     name.oninput = settle;
     list.replaceChildren(
-      ...names.map((file) => {
+      ...names.map((/** @type {string} */ file) => {
         const item = document.createElement("li"),
           button = document.createElement("button");
         button.type = "button";
@@ -495,7 +537,7 @@ class Program {
     );
     const mine = (this.choosing = {});
     let under = false; // one at a time
-    form.onsubmit = async (event) => {
+    form.onsubmit = async (/** @type {Event} */ event) => {
       event.preventDefault();
       const asked = name.value;
       if (!asked || under) return;
@@ -515,6 +557,7 @@ class Program {
     name.select();
   }
 
+  /** @param {string} text */
   say(text, kind = "") {
     this.told = kind;
     for (const told of this.root.querySelectorAll(".program-told")) {
@@ -523,7 +566,11 @@ class Program {
     }
   }
 
-  /* A call; its error is shown, and undefined comes back. */
+  /**
+   * A call; its error is shown, and undefined comes back.
+   * @param {string} name
+   * @param {...any} values
+   */
   async ask(name, ...values) {
     try {
       return await detent.call(name, ...values);

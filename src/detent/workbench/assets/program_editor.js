@@ -1,18 +1,31 @@
 /* The editor of the Program page: CodeMirror, as NiceGUI brings it, told the language of a unit from the table of its
    controller: colours, completion, help, errors, addresses, breakpoints and the line that runs. */
 
+import { cut } from "./program_parts.js";
+
+/** @type {any} */
 let CM = null;
 
-/* The editor in `place`. `told` has changed(typed), toggled(line), keys {key: action}. */
+/**
+ * The editor in `place`. `told` has changed(typed), toggled(line), keys {key: action}.
+ * @param {HTMLElement} place
+ * @param {any} told
+ */
 export async function makeEditor(place, told) {
   await prepare();
   return new Editor(place, told);
 }
 
 class Editor {
+  /**
+   * @param {HTMLElement} place
+   * @param {any} told
+   */
   constructor(place, told) {
     this.told = told;
+    /** @type {{words: Word[], comment: string, language: boolean}} */
     this.facts = { words: [], comment: ";", language: true };
+    /** @type {Record<string, number>} */
     this.labels = {};
     this.addresses = ranges();
     this.breakpoints = ranges();
@@ -31,7 +44,10 @@ class Editor {
     return this.view.state.doc.lineAt(this.view.state.selection.main.head).number;
   }
 
-  /* Show another text; nobody has typed it. */
+  /**
+   * Show another text; nobody has typed it.
+   * @param {string} text
+   */
   set(text) {
     this.quiet = true;
     this.view.dispatch({
@@ -41,7 +57,10 @@ class Editor {
     this.quiet = false;
   }
 
-  /* Take the language of a unit (what `program_about` gave). */
+  /**
+   * Take the language of a unit (what `program_about` gave).
+   * @param {any} facts
+   */
   speak(facts) {
     this.facts = facts;
     this.view.dispatch({ effects: this.language.reconfigure(this.colours()) });
@@ -57,7 +76,10 @@ class Editor {
 
   /* -- what is shown beside and under the text ------------------------------------------------------------- */
 
-  /* What `program_check` found. */
+  /**
+   * What `program_check` found.
+   * @param {{errors: [number, number, number, string][], places: [number, number, number][], labels: Record<string, number>}} found
+   */
   check({ errors, places, labels }) {
     const { doc } = this.view.state;
     this.labels = labels;
@@ -79,12 +101,13 @@ class Editor {
                 Math.max(Math.min(begin + length, to), begin + Number(to > begin)),
               );
             })
-            .filter(({ from, to }) => to > from),
+            .filter((/** @type {{from: number, to: number}} */ { from, to }) => to > from),
         ),
       ],
     });
   }
 
+  /** @param {number[]} lines */
   breakAt(lines) {
     const { doc } = this.view.state;
     this.view.dispatch({
@@ -95,6 +118,7 @@ class Editor {
   }
 
   get breakLines() {
+    /** @type {number[]} */
     const lines = [],
       { doc } = this.view.state;
     for (const cursor = this.view.state.field(this.breakpoints.field).iter(); cursor.value; cursor.next())
@@ -102,9 +126,15 @@ class Editor {
     return [...new Set(lines)];
   }
 
-  /* The line that runs (null: none), whether it stands there, and the lines that differ from memory. */
+  /**
+   * The line that runs (null: none), whether it stands there, and the lines that differ from memory.
+   * @param {number | null} running
+   * @param {boolean} stands
+   * @param {number[]} different
+   */
   spot(running, stands, different) {
     const { doc } = this.view.state,
+      /** @type {[number, string][]} */
       lines = [];
     for (const line of different) if (line <= doc.lines) lines.push([line, "cm-differs"]);
     if (running !== null && running <= doc.lines) lines.push([running, stands ? "cm-runs cm-stands" : "cm-runs"]);
@@ -116,12 +146,14 @@ class Editor {
     });
   }
 
+  /** @param {number} line */
   reveal(line) {
     const { doc } = this.view.state;
     if (line <= doc.lines)
       this.view.dispatch({ effects: CM.EditorView.scrollIntoView(doc.line(line).from, { y: "nearest", yMargin: 60 }) });
   }
 
+  /** @param {number} line */
   goTo(line, column = 1) {
     const { doc } = this.view.state,
       { from, to } = doc.line(Math.min(line, doc.lines));
@@ -133,12 +165,16 @@ class Editor {
 
   extensions() {
     this.language = new CM.Compartment();
-    const data = [{ autocomplete: (context) => this.complete(context) }]; // one and the same: a new one begins anew
+    const data = [{ autocomplete: (/** @type {any} */ context) => this.complete(context) }]; // one and the same: a new one begins anew
+    /**
+     * @param {any} view
+     * @param {{from: number}} line
+     */
     const toggle = (view, line) => {
       this.told.toggled(view.state.doc.lineAt(line.from).number);
       return true;
     };
-    const changes = CM.EditorView.updateListener.of((update) => {
+    const changes = CM.EditorView.updateListener.of((/** @type {any} */ update) => {
       if (update.docChanged) this.told.changed(!this.quiet);
     });
     const actions = Object.entries(this.told.keys || {}).map(([key, action]) => ({
@@ -158,21 +194,21 @@ class Editor {
       CM.gutter({
         class: "cm-breaks",
         renderEmptyElements: true,
-        markers: (view) => view.state.field(this.breakpoints.field),
+        markers: (/** @type {any} */ view) => view.state.field(this.breakpoints.field),
         initialSpacer: () => new Dot(),
         domEventHandlers: { mousedown: toggle },
       }),
       CM.basicSetup,
       CM.gutter({
         class: "cm-addresses",
-        markers: (view) => view.state.field(this.addresses.field),
+        markers: (/** @type {any} */ view) => view.state.field(this.addresses.field),
         initialSpacer: () => new Place(1000, 4),
         domEventHandlers: { mousedown: toggle },
       }),
       CM.EditorView.decorations.from(this.errors.field),
       CM.EditorView.decorations.from(this.spots.field),
       CM.EditorState.languageData.of(() => data),
-      CM.hoverTooltip((view, at) => this.help(view, at), { hoverTime: 250 }),
+      CM.hoverTooltip((/** @type {any} */ view, /** @type {number} */ at) => this.help(view, at), { hoverTime: 250 }),
       this.language.of([]),
       changes,
       CM.EditorView.contentAttributes.of({ tabindex: "0" }),
@@ -180,31 +216,21 @@ class Editor {
     ];
   }
 
-  /* A line cut into labels, command and comment. */
+  /**
+   * A line cut into labels, command and comment.
+   * @param {string} text
+   */
   parts(text) {
-    const { comment, words, language } = this.facts;
-    const end = text.indexOf(comment),
-      code = end < 0 ? text : text.slice(0, end);
-    const labels = [];
-    let start = 0;
-    if (language) {
-      const label = /\s*([^\s:]+)\s*:/y;
-      for (let match; (label.lastIndex = start), (match = label.exec(code)); start = label.lastIndex)
-        labels.push([start + match[0].indexOf(match[1]), match[1].length]);
-    }
-    start += code.slice(start).search(/\S|$/);
-    const rest = code.slice(start);
-    const word = words.find(
-      ({ spelling, whole }) => rest.startsWith(spelling) && (!whole || !/\w/.test(rest[spelling.length] || " ")),
-    );
-    return { code, comment: end, labels, start, word, rest };
+    return cut(text, this.facts);
   }
 
   colours() {
     const self = this,
       { language, words } = this.facts;
     const before = !language && !words.some(({ whole }) => whole); // the value stands before its command
+    /** @param {string} kind */
     const mark = (kind) => CM.Decoration.mark({ class: kind });
+    /** @type {Record<string, any>} */
     const kinds = {
       command: mark("cm-command"),
       label: mark("cm-label"),
@@ -212,8 +238,15 @@ class Editor {
       comment: mark("cm-note"),
     };
     const known = new Set(words.map(({ spelling }) => spelling));
+    /** @param {any} view */
     const decorate = (view) => {
+      /** @type {any[]} */
       const builder = [];
+      /**
+       * @param {number} from
+       * @param {number} to
+       * @param {string} kind
+       */
       const add = (from, to, kind) => to > from && builder.push(kinds[kind].range(from, to));
       for (const { from, to } of view.visibleRanges) {
         for (let at = from; at <= to;) {
@@ -246,18 +279,21 @@ class Editor {
     };
     return CM.ViewPlugin.fromClass(
       class {
+        /** @param {any} view */
         constructor(view) {
           this.decorations = decorate(view);
         }
+        /** @param {any} update */
         update(update) {
-          if (update.docChanged || update.viewportChanged || update.transactions.some(({ effects }) => effects.length))
+          if (update.docChanged || update.viewportChanged || update.transactions.some((/** @type {any} */ { effects }) => effects.length))
             this.decorations = decorate(update.view);
         }
       },
-      { decorations: (plugin) => plugin.decorations },
+      { decorations: (/** @type {any} */ plugin) => plugin.decorations },
     );
   }
 
+  /** @param {any} context */
   complete(context) {
     const line = context.state.doc.lineAt(context.pos),
       parts = this.parts(line.text);
@@ -294,9 +330,13 @@ class Editor {
     return { from: line.from + parts.start, options, validFor: /^\S{0,3}$/ };
   }
 
+  /**
+   * @param {any} view
+   * @param {number} at
+   */
   help(view, at) {
-    let message = null;
-    view.state.field(this.errors.field).between(at, at, (from, to, value) => {
+    let message = "";
+    view.state.field(this.errors.field).between(at, at, (/** @type {number} */ from, /** @type {number} */ to, /** @type {any} */ value) => {
       message = value.spec.message;
     });
     const line = view.state.doc.lineAt(at),
@@ -320,7 +360,11 @@ class Editor {
   }
 }
 
-/* What the table says of a command. */
+/**
+ * What the table says of a command.
+ * @param {any[]} rows
+ * @param {boolean} language
+ */
 export function sheet(rows, language) {
   const dom = document.createElement("div");
   dom.className = "cm-sheet";
@@ -336,6 +380,10 @@ export function sheet(rows, language) {
   return dom;
 }
 
+/**
+ * @param {string} text
+ * @param {string} kind
+ */
 function paragraph(text, kind) {
   const made = document.createElement("p");
   made.className = kind;
@@ -343,11 +391,16 @@ function paragraph(text, kind) {
   return made;
 }
 
-/* Whether the line of a range was changed. */
+/**
+ * Whether the line of a range was changed.
+ * @param {any} transaction
+ * @param {number} from
+ * @param {number} to
+ */
 function touched(transaction, from, to) {
   const { doc } = transaction.state;
   let found = false;
-  transaction.changes.iterChangedRanges((a, b, begin, end) => {
+  transaction.changes.iterChangedRanges((/** @type {number} */ a, /** @type {number} */ b, /** @type {number} */ begin, /** @type {number} */ end) => {
     found ||= doc.lineAt(begin).from <= to && from <= doc.lineAt(end).to;
   });
   return found;
@@ -358,9 +411,10 @@ function ranges(fades = false) {
   const set = CM.StateEffect.define();
   const field = CM.StateField.define({
     create: () => CM.RangeSet.empty,
-    update(value, transaction) {
+    /** @param {any} transaction */
+    update(/** @type {any} */ value, /** @type {any} */ transaction) {
       value = value.map(transaction.changes);
-      if (fades && transaction.docChanged) value = value.update({ filter: (from, to) => !touched(transaction, from, to) });
+      if (fades && transaction.docChanged) value = value.update({ filter: (/** @type {number} */ from, /** @type {number} */ to) => !touched(transaction, from, to) });
       for (const effect of transaction.effects) if (effect.is(set)) value = CM.RangeSet.of(effect.value, true);
       return value;
     },
@@ -368,8 +422,10 @@ function ranges(fades = false) {
   return { field, set };
 }
 
-let Dot = null,
-  Place = null;
+/** @type {any} */
+let Dot = null;
+/** @type {any} */
+let Place = null;
 
 /* Gutter markers are classes of CodeMirror's, which is loaded when it is needed. */
 async function prepare() {
@@ -386,17 +442,22 @@ async function prepare() {
     }
   };
   Place ||= class extends CM.GutterMarker {
+    /**
+     * @param {number} address
+     * @param {number} bytes
+     */
     constructor(address, bytes) {
       super();
       this.address = address;
       this.bytes = bytes;
     }
+    /** @param {any} other */
     eq(other) {
       return other.address === this.address && other.bytes === this.bytes;
     }
     toDOM() {
       const place = document.createElement("span");
-      place.textContent = this.address;
+      place.textContent = String(this.address);
       place.title = `byte ${this.address}, ${this.bytes} byte${this.bytes === 1 ? "" : "s"}`;
       return place;
     }

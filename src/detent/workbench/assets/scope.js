@@ -1,26 +1,39 @@
 /* The Scope page: puts plot, hands, tools and feed together. Several windows have each their own view. */
 
+import { element } from "./elements.js";
 import { Feed } from "./scope_feed.js";
 import { ScopeInput, KEYS } from "./scope_input.js";
 import { Plot, showTime } from "./scope_plot.js";
-import { Tools, element } from "./scope_tools.js";
+import { Tools } from "./scope_tools.js";
 
 const LEAST_SPAN = 20,
   MOST_SPAN = 400 * 86400e9; // ns of a view
 const FIRST_SPAN = 4e9;
 
-class Scope {
+export class Scope {
+  /** @param {Part} root */
   constructor(root) {
     this.root = root;
     this.view = { begin: -FIRST_SPAN, end: 0 };
     this.following = true;
+    /** @type {[number | null, number | null]} */
     this.cursors = [null, null];
+    /** @type {any} the trigger, since when */
     this.armed = null;
+    /** @type {Frame | null} */
     this.frame = null;
+    /** @type {Record<string, [any, any]>} */
     this.values = {};
+    /** @type {Trace[]} */
     this.catalogue = [];
-    this.shown = null; // ids, once the catalogue is known
+    /** @type {string[]} ids, once the catalogue is known */
+    this.shown = [];
+    this.known = false; // the catalogue
+    /** @type {Point | null} */
     this.selection = null;
+    this.cell = "";
+    this.due = 0; // the frame that is asked for
+    this.acknowledges = false;
     const tools = element("div", { class: "scope-tools" });
     this.strip = element("div", { class: "scope-strip", hidden: true, "aria-live": "off" });
     this.lanes = element("ol", { class: "scope-lanes" });
@@ -71,11 +84,13 @@ class Scope {
 
   /* -- what the feed brings -------------------------------------------------------------------------------- */
 
+  /** @param {any} news */
   hear(news) {
     if (news.traces) {
       this.catalogue = news.traces;
-      const known = new Set(news.traces.map((trace) => trace.id));
-      if (this.shown === null) this.shown = (remembered(news.cell) || news.first).filter((id) => known.has(id));
+      const known = new Set(this.catalogue.map((trace) => trace.id));
+      if (!this.known) this.shown = (remembered(news.cell) || news.first).filter((/** @type {string} */ id) => known.has(id));
+      this.known = true;
       if (!this.shown.length) this.shown = news.first;
       this.cell = news.cell;
       this.tools.offer(this.catalogue, this.shown);
@@ -88,6 +103,7 @@ class Scope {
     if (news.error) detent.toast(news.error, "error");
   }
 
+  /** @param {Frame} frame */
   take(frame) {
     this.frame = frame;
     this.values = Object.fromEntries(frame.traces.map((trace) => [trace.id, trace.values]));
@@ -104,6 +120,7 @@ class Scope {
     this.paint(true);
   }
 
+  /** @param {{file: string, bytes: BlobPart}} kept */
   keep({ file, bytes }) {
     const link = element("a", { href: URL.createObjectURL(new Blob([bytes])), download: file });
     link.click();
@@ -112,7 +129,10 @@ class Scope {
 
   /* -- the view ------------------------------------------------------------------------------------------- */
 
-  /* Show from begin to end, and no longer follow the present. */
+  /**
+   * Show from begin to end, and no longer follow the present.
+   * @param {View} view
+   */
   look({ begin, end }) {
     const span = Math.min(Math.max(end - begin, LEAST_SPAN), MOST_SPAN);
     if (span !== end - begin) [begin, end] = [(begin + end - span) / 2, (begin + end + span) / 2];
@@ -121,7 +141,10 @@ class Scope {
     this.changed();
   }
 
-  /* Go on following, with so much time in the view. */
+  /**
+   * Go on following, with so much time in the view.
+   * @param {number} span
+   */
   spread(span) {
     span = Math.min(Math.max(span, LEAST_SPAN), MOST_SPAN);
     this.view = { begin: this.view.end - span, end: this.view.end };
@@ -138,17 +161,25 @@ class Scope {
     if (this.frame) this.look({ begin: this.frame.first, end: Math.max(this.frame.now, this.frame.first + 1000) });
   }
 
-  /* Bring an instant to the quarter of the view. */
+  /**
+   * Bring an instant to the quarter of the view.
+   * @param {number} at
+   */
   put(at) {
     const span = this.view.end - this.view.begin;
     this.look({ begin: at - span / 4, end: at + (3 * span) / 4 });
   }
 
+  /** @param {Point | null} range */
   select(range) {
     this.selection = range;
     this.paint();
   }
 
+  /**
+   * @param {number} index
+   * @param {number} at
+   */
   moveCursor(index, at) {
     this.cursors[index] = Math.round(at);
     this.changed();
@@ -169,18 +200,24 @@ class Scope {
     }
   }
 
+  /** @param {any} trigger */
   arm(trigger) {
     this.armed = trigger && { ...trigger, since: this.frame ? this.frame.now : 0 };
     if (trigger) this.following = true;
     if (this.catalogue.length) this.changed();
   }
 
+  /** @param {number} direction */
   find(direction) {
     const span = this.view.end - this.view.begin;
     const from = this.following ? this.view.end : this.view.begin + span / 4;
-    this.feed.say({ find: { ...this.tools.wanted, from: Math.round(from), direction } });
+    this.feed.say({ find: { ...this.tools.set, from: Math.round(from), direction } });
   }
 
+  /**
+   * @param {string} id
+   * @param {boolean} on
+   */
   show(id, on) {
     this.shown = this.catalogue
       .map((trace) => trace.id)
@@ -190,6 +227,7 @@ class Scope {
     this.arrange();
   }
 
+  /** @param {string} kind */
   save(kind) {
     if (kind !== "png") {
       this.feed.say({
@@ -198,7 +236,7 @@ class Scope {
       return;
     }
     this.picture().toBlob(
-      async (blob) => this.keep({ file: "scope.png", bytes: await blob.arrayBuffer() }),
+      async (blob) => blob && this.keep({ file: "scope.png", bytes: await blob.arrayBuffer() }),
       "image/png",
     );
   }
@@ -211,7 +249,7 @@ class Scope {
       copy = element("canvas");
     copy.width = canvas.width + left;
     copy.height = canvas.height;
-    const pen = copy.getContext("2d");
+    const pen = /** @type {CanvasRenderingContext2D} */ (copy.getContext("2d"));
     pen.fillStyle = this.plot.colours.ground;
     pen.fillRect(0, 0, copy.width, copy.height);
     pen.drawImage(canvas, left, 0);
@@ -219,7 +257,7 @@ class Scope {
     for (const lane of this.plot.lanes)
       lane.traces.forEach((trace, k) => {
         const y = lane.level ? lane.top + lane.height / 2 : lane.top + 16 + 16 * k;
-        pen.fillStyle = this.plot.colours.traces[trace.index % 8];
+        pen.fillStyle = this.plot.inks[trace.index % 8];
         pen.fillRect(10, y - 1, 12, 3);
         pen.fillStyle = this.plot.colours.ink;
         pen.font = this.plot.font;
@@ -233,11 +271,11 @@ class Scope {
   /* -- painting --------------------------------------------------------------------------------------------- */
 
   arrange() {
-    if (this.shown === null || !this.place.isConnected) return;
+    if (!this.known || !this.place.isConnected) return;
     const byId = new Map(this.catalogue.map((trace) => [trace.id, trace]));
-    const traces = this.shown.filter((id) => byId.has(id)).map((id) => byId.get(id));
+    const traces = this.shown.flatMap((id) => byId.get(id) ?? []);
     this.plot.ruler = matchMedia("(pointer: coarse)").matches ? 38 : 28;
-    const { clientWidth } = this.plot.canvas.parentElement;
+    const { clientWidth } = /** @type {Part} */ (this.plot.canvas.parentElement);
     this.plot.arrange(traces, clientWidth, this.place.clientHeight);
     this.plot.resize(clientWidth);
     this.lanes.style.height = `${this.plot.height}px`;
@@ -252,7 +290,7 @@ class Scope {
   }
 
   ask() {
-    if (this.shown === null) return;
+    if (!this.known) return;
     const { view, following, armed } = this;
     this.feed.ask({
       traces: this.shown,
@@ -276,16 +314,17 @@ class Scope {
         this.root.dataset.frames = this.plot.painted + 1;
       }
       this.plot.paint(this.view, this.frame, this.cursors, this.selection);
-      if (!this.tools.byId) return;
+      if (!this.tools.byId.size) return;
       this.tools.read(this.lanes, this.values, this.cursors, this.view, this.following);
       this.tools.differ(this.strip, this.cursors, this.view);
     });
   }
 }
 
+/** @param {string} cell */
 function remembered(cell) {
   try {
-    return JSON.parse(detent.remembered(`scope.${cell}`));
+    return JSON.parse(detent.remembered(`scope.${cell}`) || "null");
   } catch {
     return null;
   }

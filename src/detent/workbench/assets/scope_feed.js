@@ -6,28 +6,33 @@
    next frame when the page has acknowledged the last. */
 
 export class Feed {
+  /**
+   * @param {string} url
+   * @param {{onFrame: (frame: Frame) => void, onNews: (news: any) => void, onFile: (file: any) => void, onState: (open: boolean) => void}} told
+   */
   constructor(url, { onFrame, onNews, onFile, onState }) {
     this.url = url;
     this.onFrame = onFrame;
     this.onNews = onNews;
     this.onFile = onFile;
     this.onState = onState;
-    this.waiting = []; // messages to send once there is a connection
+    /** @type {string[]} messages to send once there is a connection */
+    this.waiting = [];
     this.wait = 500; // ms before the next attempt
     this.closed = false;
-    this.connect();
+    this.socket = this.connected();
   }
 
-  connect() {
-    this.socket = new WebSocket(this.url);
-    this.socket.binaryType = "arraybuffer";
-    this.socket.onopen = () => {
+  connected() {
+    const socket = new WebSocket(this.url);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
       this.wait = 500;
       this.onState(true);
-      for (const text of this.waiting.splice(0)) this.socket.send(text);
-      if (this.view) this.socket.send(this.view);
+      for (const text of this.waiting.splice(0)) socket.send(text);
+      if (this.view) socket.send(this.view);
     };
-    this.socket.onmessage = ({ data }) => {
+    socket.onmessage = ({ data }) => {
       if (typeof data === "string") this.onNews(JSON.parse(data));
       else {
         const frame = decode(data);
@@ -35,19 +40,26 @@ export class Feed {
         else this.onFrame(frame);
       }
     };
-    this.socket.onclose = () => {
+    socket.onclose = () => {
       this.onState(false);
-      if (!this.closed) setTimeout(() => this.closed || this.connect(), (this.wait = Math.min(this.wait * 1.6, 5000)));
+      if (!this.closed) setTimeout(() => this.closed || (this.socket = this.connected()), (this.wait = Math.min(this.wait * 1.6, 5000)));
     };
+    return socket;
   }
 
-  /* Ask for a view; the last one counts. */
+  /**
+   * Ask for a view; the last one counts.
+   * @param {object} view
+   */
   ask(view) {
     this.view = JSON.stringify({ view });
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(this.view);
   }
 
-  /* Ask for something else, once. */
+  /**
+   * Ask for something else, once.
+   * @param {object} message
+   */
   say(message) {
     const text = JSON.stringify(message);
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(text);
@@ -64,6 +76,7 @@ export class Feed {
   }
 }
 
+/** @param {number} length */
 const filled = (length) => (length + 7) & ~7;
 
 /**

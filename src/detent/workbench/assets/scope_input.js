@@ -4,6 +4,7 @@
    fingers zoom; a double click shows everything. The keys are in KEYS. `scope` has view, cursors, plot and the calls
    look(view), moveCursor(index, at), select(from, to), follow(), fit(). */
 
+/** @type {Record<string, number>} */
 const GRAB = { mouse: 7, pen: 12, touch: 22 }; // px from a cursor's line
 const ZOOM = 1.25;
 const TAP = 5; // px that a pointer may move in a tap
@@ -11,31 +12,36 @@ const TAP = 5; // px that a pointer may move in a tap
 export const KEYS = "arrows pan and zoom, f follows, 0 shows everything, a and b place the cursors, Esc removes them";
 
 export class ScopeInput {
+  /**
+   * @param {HTMLElement} place
+   * @param {import("./scope.js").Scope} scope
+   */
   constructor(place, scope) {
     this.place = place;
     this.scope = scope;
+    /** @type {Map<number, number>} which pointer, where */
     this.pointers = new Map();
-    /** @type {any} */ // of the `kind` pan, range, cursor or pinch
+    /** @type {any} of the `kind` pan, range, cursor or pinch */
     this.drag = null;
+    /** @type {number | null} */
     this.hover = null;
-    for (const kind of [
-      "pointerdown",
-      "pointermove",
-      "pointerup",
-      "pointercancel",
-      "pointerleave",
-      "dblclick",
-      "keydown",
-    ])
-      place.addEventListener(kind, (event) => this[kind](event));
+    place.addEventListener("pointerdown", (event) => this.pointerdown(event));
+    place.addEventListener("pointermove", (event) => this.pointermove(event));
+    place.addEventListener("pointerup", (event) => this.pointerup(event));
+    place.addEventListener("pointercancel", (event) => this.pointercancel(event));
+    place.addEventListener("pointerleave", () => this.pointerleave());
+    place.addEventListener("dblclick", () => this.dblclick());
+    place.addEventListener("keydown", (event) => this.keydown(event));
     place.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
   }
 
+  /** @param {MouseEvent} event */
   at(event) {
     const box = this.place.getBoundingClientRect();
     return { x: event.clientX - box.left, y: event.clientY - box.top };
   }
 
+  /** @param {PointerEvent} event */
   pointerdown(event) {
     if (event.button) return;
     const { x, y } = this.at(event);
@@ -54,6 +60,7 @@ export class ScopeInput {
     else this.drag = { kind: "pan", from: x, view: scope.view, moved: false };
   }
 
+  /** @param {PointerEvent} event */
   pointermove(event) {
     const { x, y } = this.at(event);
     const { scope, drag } = this;
@@ -73,7 +80,7 @@ export class ScopeInput {
       const by = ((drag.from - x) / scope.plot.width) * (drag.view.end - drag.view.begin);
       scope.look({ begin: drag.view.begin + by, end: drag.view.end + by });
     } else if (drag.kind === "pinch" && this.pointers.size === 2) {
-      const [a, b] = drag.from.map((from) => scope.plot.t(drag.view, from));
+      const [a, b] = drag.from.map((/** @type {number} */ from) => scope.plot.t(drag.view, from));
       const [xa, xb] = [...this.pointers.values()];
       if (Math.abs(xb - xa) < 8) return;
       const perPixel = (b - a) / (xb - xa);
@@ -82,6 +89,7 @@ export class ScopeInput {
     }
   }
 
+  /** @param {PointerEvent} event */
   pointerup(event) {
     const { drag, scope } = this;
     const { x } = this.at(event);
@@ -95,6 +103,7 @@ export class ScopeInput {
     }
   }
 
+  /** @param {PointerEvent} event */
   pointercancel(event) {
     this.pointers.delete(event.pointerId);
     this.drag = null;
@@ -109,6 +118,7 @@ export class ScopeInput {
     this.scope.fit();
   }
 
+  /** @param {WheelEvent} event */
   wheel(event) {
     event.preventDefault();
     const sideways = Math.abs(event.deltaX) > Math.abs(event.deltaY);
@@ -119,14 +129,21 @@ export class ScopeInput {
     this.zoom(ZOOM ** Math.max(-4, Math.min(4, event.deltaY / 80)), this.at(event).x);
   }
 
-  /* Move the view by a part of its width. */
+  /**
+   * Move the view by a part of its width.
+   * @param {number} part
+   */
   pan(part) {
     const { view } = this.scope,
       by = part * (view.end - view.begin);
     this.scope.look({ begin: view.begin + by, end: view.end + by });
   }
 
-  /* Show `times` as much around the place x (null: in following the right edge, else the middle). */
+  /**
+   * Show `times` as much around the place x (null: in following the right edge, else the middle).
+   * @param {number} times
+   * @param {number | null} x
+   */
   zoom(times, x = null) {
     const { scope } = this,
       { view } = scope;
@@ -138,12 +155,14 @@ export class ScopeInput {
     scope.look({ begin: fixed - (fixed - view.begin) * times, end: fixed + (view.end - fixed) * times });
   }
 
+  /** @param {KeyboardEvent} event */
   keydown(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const place = () => {
       const { view, plot } = this.scope;
       return plot.t(view, this.hover === null ? plot.width / 2 : this.hover);
     };
+    /** @type {Record<string, () => void>} */
     const actions = {
       ArrowLeft: () => this.pan(-0.15),
       ArrowRight: () => this.pan(0.15),

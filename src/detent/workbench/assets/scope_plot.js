@@ -14,12 +14,19 @@ const PADDING = 0.08; // of a lane's range above and below
 const SHRINK = 0.55; // a range is kept until the values fill no more than this
 
 export class Plot {
+  /** @param {HTMLCanvasElement} canvas */
   constructor(canvas) {
     this.canvas = canvas;
-    this.pen = canvas.getContext("2d");
+    this.pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     this.ruler = 28;
-    this.lanes = []; // {traces, top, height, level, low, high}
+    /** @type {Lane[]} */
+    this.lanes = [];
+    /** @type {Record<string, string>} */
     this.colours = {};
+    /** @type {string[]} of the traces */
+    this.inks = [];
+    this.font = "11px monospace";
+    this.head = 0; // px more in a lane that has its labels on it
     this.width = this.height = 0; // of the plot; right of it is the margin with the values
     this.margin = 0;
     this.painted = 0; // frames
@@ -28,6 +35,7 @@ export class Plot {
   /* Take the colours from the style sheet. Call it again when the theme changes. */
   restyle() {
     const style = getComputedStyle(this.canvas);
+    /** @param {string} name */
     const value = (name) => style.getPropertyValue(name).trim();
     this.colours = {
       ink: value("--scope-ink"),
@@ -38,13 +46,18 @@ export class Plot {
       mark: value("--scope-mark"),
       cursor: value("--scope-cursor"),
       shade: value("--scope-shade"),
-      traces: [1, 2, 3, 4, 5, 6, 7, 8].map((n) => value(`--scope-trace-${n}`)),
     };
+    this.inks = [1, 2, 3, 4, 5, 6, 7, 8].map((n) => value(`--scope-trace-${n}`));
     this.font = `11px ${value("--scope-mono") || "monospace"}`;
   }
 
-  /* Lay the lanes out for these traces ({id, lane, shape, low, high}), and take the size of the canvas.
-     Traces of one `lane` share it. Returns the lanes. */
+  /**
+   * Lay the lanes out for these traces ({id, lane, shape, low, high}), and take the size of the canvas.
+   * Traces of one `lane` share it. Returns the lanes.
+   * @param {Trace[]} traces
+   * @param {number} width
+   * @param {number} room
+   */
   arrange(traces, width, room) {
     this.head = width < NARROW ? HEADED : 0;
     const levelHeight = LEVEL_HEIGHT + this.head;
@@ -72,7 +85,10 @@ export class Plot {
     return this.lanes;
   }
 
-  /* Fit the canvas into its place. */
+  /**
+   * Fit the canvas into its place.
+   * @param {number} width
+   */
   resize(width) {
     this.margin = width < NARROW ? 0 : 54;
     this.width = width - this.margin;
@@ -86,36 +102,50 @@ export class Plot {
     this.pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   }
 
+  /**
+   * @param {View} view
+   * @param {number} t
+   */
   x(view, t) {
     return ((t - view.begin) / (view.end - view.begin)) * this.width;
   }
+  /**
+   * @param {View} view
+   * @param {number} x
+   */
   t(view, x) {
     return view.begin + (x / this.width) * (view.end - view.begin);
   }
 
-  /* Paint everything: `frame` may be null, and need not cover the view. */
+  /**
+   * Paint everything: `frame` may be null, and need not cover the view.
+   * @param {View} view
+   * @param {Frame | null} frame
+   * @param {(number | null)[]} cursors
+   * @param {Point | null} selection
+   */
   paint(view, frame, cursors, selection) {
     const { pen, colours } = this;
     pen.fillStyle = colours.ground;
     pen.fillRect(0, 0, this.width + this.margin, this.height);
     pen.font = this.font;
     this.axis(view);
-    const data = new Map(frame ? frame.traces.map((trace) => [trace.id, trace]) : []);
+    /** @type {Map<string, Columns>} */
+    const data = new Map();
+    for (const trace of frame ? frame.traces : []) data.set(trace.id, trace);
     for (const lane of this.lanes) {
-      const present = lane.traces.filter((trace) => data.has(trace.id));
-      this.range(
-        lane,
-        present.map((trace) => data.get(trace.id)),
-        view,
-        frame,
-      );
+      const present = lane.traces.flatMap((trace) => {
+        const columns = data.get(trace.id);
+        return columns ? [{ trace, columns }] : [];
+      });
+      this.range(lane, present.map(({ columns }) => columns), view, frame);
       this.frame(lane);
       if (!lane.level) this.scale(lane);
       pen.save();
       pen.beginPath();
       pen.rect(0, lane.top, this.width, lane.height);
       pen.clip();
-      for (const trace of present) this.trace(view, frame, lane, trace, data.get(trace.id));
+      if (frame) for (const { trace, columns } of present) this.trace(view, frame, lane, trace, columns);
       pen.restore();
     }
     if (frame) this.marks(view, frame);
@@ -127,6 +157,7 @@ export class Plot {
     this.painted += 1;
   }
 
+  /** @param {View} view */
   axis(view) {
     const { pen, colours } = this;
     const step = niceStep((view.end - view.begin) / Math.max(this.width / TICK_ROOM, 1));
@@ -150,6 +181,12 @@ export class Plot {
     }
   }
 
+  /**
+   * @param {Lane} lane
+   * @param {Columns[]} data
+   * @param {View} view
+   * @param {Frame | null} frame null where there is no data
+   */
   range(lane, data, view, frame) {
     if (lane.level) {
       [lane.low, lane.high] = [0, 1];
@@ -158,6 +195,7 @@ export class Plot {
     let low = Infinity,
       high = -Infinity;
     for (const { base, low: lows, high: highs } of data) {
+      if (!frame) break;
       const first = Math.max(Math.floor((view.begin - frame.begin) / frame.width), 0);
       const last = Math.min(Math.ceil((view.end - frame.begin) / frame.width), lows.length);
       for (let i = first; i < last; i++) {
@@ -177,18 +215,26 @@ export class Plot {
     if (!fits || !(span > 0)) [lane.low, lane.high] = high > low ? [low - room, high + room] : [low - 1, high + 1];
   }
 
-  /* The y of 0 and the px of 1, downwards, in a lane. */
+  /**
+   * The y of 0 and the px of 1, downwards, in a lane.
+   * @param {Lane} lane
+   */
   map(lane) {
     const inset = lane.level ? 9 : 3;
     const rise = -(lane.height - 2 * inset - this.head) / (lane.high - lane.low);
     return [lane.top + lane.height - inset - lane.low * rise, rise];
   }
 
+  /**
+   * @param {Lane} lane
+   * @param {number} value
+   */
   y(lane, value) {
     const [zero, rise] = this.map(lane);
     return zero + value * rise;
   }
 
+  /** @param {Lane} lane */
   frame(lane) {
     const { pen, colours } = this;
     pen.strokeStyle = colours.edge;
@@ -199,10 +245,17 @@ export class Plot {
     pen.stroke();
   }
 
+  /**
+   * @param {View} view
+   * @param {Frame} frame
+   * @param {Lane} lane
+   * @param {Trace & { index: number }} info
+   * @param {Columns} data
+   */
   trace(view, frame, lane, info, data) {
     const { pen } = this,
       { low, high } = data;
-    const colour = this.colours.traces[info.index % this.colours.traces.length];
+    const colour = this.inks[info.index % this.inks.length];
     const scale = (this.width / (view.end - view.begin)) * frame.width; // px of a column
     const shift = this.x(view, frame.begin);
     const [zero, rise] = this.map(lane),
@@ -260,7 +313,16 @@ export class Plot {
     if (lane.level) this.fill(lane, colour, high, first, last, shift, scale);
   }
 
-  /* Where a level is high: a pale ground, so that lanes can be told at a glance. */
+  /**
+   * Where a level is high: a pale ground, so that lanes can be told at a glance.
+   * @param {Lane} lane
+   * @param {string} colour
+   * @param {Float32Array} high
+   * @param {number} first
+   * @param {number} last
+   * @param {number} shift
+   * @param {number} scale
+   */
   fill(lane, colour, high, first, last, shift, scale) {
     const { pen } = this;
     pen.fillStyle = colour;
@@ -276,7 +338,10 @@ export class Plot {
     pen.globalAlpha = 1;
   }
 
-  /* Labels of a lane's values. */
+  /**
+   * Labels of a lane's values.
+   * @param {Lane} lane
+   */
   scale(lane) {
     const { pen, colours } = this;
     const step = niceStep((lane.high - lane.low) / Math.max(lane.height / 34, 2));
@@ -304,9 +369,19 @@ export class Plot {
     }
   }
 
-  /* The present, the trigger, and what happened beside the traces. */
+  /**
+   * The present, the trigger, and what happened beside the traces.
+   * @param {View} view
+   * @param {Frame} frame
+   */
   marks(view, frame) {
     const { pen, colours } = this;
+    /**
+     * @param {number} at
+     * @param {string} colour
+     * @param {string} label
+     * @param {number[]} dash
+     */
     const upright = (at, colour, label, dash) => {
       const x = crisp(this.x(view, at));
       if (x < 0 || x > this.width) return;
@@ -336,6 +411,11 @@ export class Plot {
     }
   }
 
+  /**
+   * @param {View} view
+   * @param {number} at
+   * @param {string} name
+   */
   cursor(view, at, name) {
     const { pen, colours } = this;
     const x = crisp(this.x(view, at));
@@ -353,22 +433,33 @@ export class Plot {
   }
 }
 
+/** @param {number} x */
 const crisp = (x) => Math.round(x) + 0.5;
 
-/* 1, 2 or 5 times a power of ten, not below `least`. */
+/**
+ * 1, 2 or 5 times a power of ten, not below `least`.
+ * @param {number} least
+ */
 export function niceStep(least) {
   const power = 10 ** Math.floor(Math.log10(least));
   return [1, 2, 5, 10].map((k) => k * power).find((step) => step >= least * 0.999999) || 10 * power;
 }
 
-/* A time of the cell (ns) in seconds, with as many figures as a step of `step` ns needs. */
+/**
+ * A time of the cell (ns) in seconds, with as many figures as a step of `step` ns needs.
+ * @param {number} t
+ * @param {number} step
+ */
 export function showTime(t, step) {
   const figures = Math.min(Math.max(Math.ceil(9 - Math.log10(Math.max(step, 1))), 0), 9);
   const [whole, part = ""] = (Math.round(t) / 1e9).toFixed(figures).split(".");
   return `${whole}${part && "." + part.replace(/(...)(?=.)/g, "$1\u2009")} s`;
 }
 
-/* A length of time in ns, for people: 1.25 ms. */
+/**
+ * A length of time in ns, for people: 1.25 ms.
+ * @param {number} ns
+ */
 export function showSpan(ns) {
   const size = Math.abs(ns);
   for (const [unit, of] of Object.entries({ s: 1e9, ms: 1e6, "\u00b5s": 1e3 }))
@@ -376,13 +467,17 @@ export function showSpan(ns) {
   return `${Math.round(ns)} ns`;
 }
 
+/** @param {number} hertz */
 export function showRate(hertz) {
   for (const [unit, of] of Object.entries({ MHz: 1e6, kHz: 1e3 }))
     if (hertz >= of) return `${+(hertz / of).toPrecision(5)} ${unit}`;
   return `${+hertz.toPrecision(5)} Hz`;
 }
 
-/* A value, with the figures that a step of `step` needs (0: six figures). */
+/**
+ * A value, with the figures that a step of `step` needs (0: six figures).
+ * @param {number} value
+ */
 export function showNumber(value, step = 0) {
   if (!step) return `${+value.toPrecision(6)}`.replace("-", "\u2212");
   const figures = Math.min(Math.max(-Math.floor(Math.log10(step) + 1e-9), 0), 9);

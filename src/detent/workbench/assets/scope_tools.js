@@ -3,19 +3,14 @@
    They are built from the catalogue of traces that the feed sends:
    {id, unit, name, title, lane, shape, level, units}. */
 
+import { element } from "./elements.js";
 import { showNumber, showRate, showSpan, showTime } from "./scope_plot.js";
 
-export function element(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-    else if (value !== false && value !== null && value !== undefined)
-      made.setAttribute(name, value === true ? "" : value);
-  }
-  made.append(...children);
-  return made;
-}
-
+/**
+ * @param {string} label
+ * @param {string} help
+ * @param {() => void} action
+ */
 const key = (label, help, action, more = {}) =>
   element(
     "button",
@@ -24,6 +19,10 @@ const key = (label, help, action, more = {}) =>
   );
 
 export class Tools {
+  /**
+   * @param {HTMLElement} root
+   * @param {import("./scope.js").Scope} scope
+   */
   constructor(root, scope) {
     this.scope = scope;
     this.followKey = key("Follow", "Follow the present", () => scope.follow(), {
@@ -37,6 +36,34 @@ export class Tools {
     this.traces = this.menu("Traces", "scope-traces");
     this.trigger = this.menu("Trigger", "scope-trigger");
     this.files = this.menu("Export", "scope-export");
+    this.source = this.choice("trigger source", [["error", "any error"]]);
+    this.edge = this.choice("trigger edge", [
+      ["rise", "rising"],
+      ["fall", "falling"],
+      ["both", "either way"],
+    ]);
+    this.level = element("input", {
+      class: "field mono",
+      type: "number",
+      step: "any",
+      value: 0,
+      "aria-label": "trigger level",
+      onchange: () => this.arm(),
+    });
+    this.mode = this.choice("trigger mode", [
+      ["off", "off"],
+      ["normal", "each time"],
+      ["single", "once"],
+    ]);
+    this.levelRow = element("label", {}, element("span", {}, "crosses"), this.level);
+    this.edgeRow = element("label", {}, element("span", {}, "edge"), this.edge);
+    this.found = element("output", { class: "quiet" });
+    /** @type {Map<string | undefined, Trace>} the catalogue */
+    this.byId = new Map();
+    this.away = (/** @type {Event} */ event) => {
+      const at = /** @type {Node} */ (event.target);
+      for (const { details } of this.menus) if (details.open && !details.contains(at)) details.open = false;
+    };
     root.append(
       element(
         "div",
@@ -52,12 +79,7 @@ export class Tools {
     );
     this.triggerPanel();
     this.exportPanel();
-    document.addEventListener(
-      "pointerdown",
-      (this.away = (event) => {
-        for (const { details } of this.menus) if (details.open && !details.contains(event.target)) details.open = false;
-      }),
-    );
+    document.addEventListener("pointerdown", this.away);
   }
 
   get menus() {
@@ -68,18 +90,18 @@ export class Tools {
     document.removeEventListener("pointerdown", this.away);
   }
 
+  /**
+   * @param {string} name
+   * @param {string} kind
+   */
   menu(name, kind) {
     const panel = element("div", { class: "scope-panel panel" });
-    const details = element(
-      "details",
-      { class: `scope-menu ${kind}` },
-      element("summary", { class: "key small" }, name),
-      panel,
-    );
+    const summary = element("summary", { class: "key small" }, name);
+    const details = element("details", { class: `scope-menu ${kind}` }, summary, panel);
     details.addEventListener("keydown", (event) => {
       if (event.key === "Escape" && details.open) {
         details.open = false;
-        details.firstChild.focus();
+        summary.focus();
         event.stopPropagation();
       }
     });
@@ -91,6 +113,10 @@ export class Tools {
 
   /* -- which traces ------------------------------------------------------------------------------------- */
 
+  /**
+   * @param {Trace[]} catalogue
+   * @param {string[]} shown
+   */
   offer(catalogue, shown) {
     const { panel } = this.traces;
     const search = element("input", {
@@ -122,7 +148,7 @@ export class Tools {
     }
     search.addEventListener("input", () => {
       for (const label of panel.querySelectorAll("label"))
-        label.hidden = !label.dataset.words.includes(search.value.toLowerCase());
+        label.hidden = !label.dataset.words?.includes(search.value.toLowerCase());
       for (const group of groups.values()) group.hidden = !group.querySelector("label:not([hidden])");
     });
     panel.replaceChildren(search, element("div", { class: "scope-list" }, ...groups.values()));
@@ -137,42 +163,32 @@ export class Tools {
     this.arm();
   }
 
+  /** @param {string[]} shown */
   tick(shown) {
-    for (const box of this.traces.panel.querySelectorAll("input[type=checkbox]"))
+    for (const box of this.boxes())
       box.checked = shown.includes(box.value);
+  }
+
+  /** @returns {NodeListOf<HTMLInputElement>} */
+  boxes() {
+    return this.traces.panel.querySelectorAll("input[type=checkbox]");
   }
 
   /* -- the trigger -------------------------------------------------------------------------------------- */
 
+  /**
+   * @param {string} label
+   * @param {string[][]} options value, words
+   */
+  choice(label, options) {
+    return element(
+      "select",
+      { class: "field", "aria-label": label, onchange: () => this.arm() },
+      ...options.map(([value, words]) => element("option", { value }, words)),
+    );
+  }
+
   triggerPanel() {
-    const choice = (label, options) =>
-      element(
-        "select",
-        { class: "field", "aria-label": label, onchange: () => this.arm() },
-        ...options.map(([value, words]) => element("option", { value }, words)),
-      );
-    this.source = choice("trigger source", [["error", "any error"]]);
-    this.edge = choice("trigger edge", [
-      ["rise", "rising"],
-      ["fall", "falling"],
-      ["both", "either way"],
-    ]);
-    this.level = element("input", {
-      class: "field mono",
-      type: "number",
-      step: "any",
-      value: 0,
-      "aria-label": "trigger level",
-      onchange: () => this.arm(),
-    });
-    this.mode = choice("trigger mode", [
-      ["off", "off"],
-      ["normal", "each time"],
-      ["single", "once"],
-    ]);
-    this.levelRow = element("label", {}, element("span", {}, "crosses"), this.level);
-    this.edgeRow = element("label", {}, element("span", {}, "edge"), this.edge);
-    this.found = element("output", { class: "quiet" });
     this.trigger.panel.append(
       element("label", {}, element("span", {}, "on"), this.source),
       this.edgeRow,
@@ -189,16 +205,16 @@ export class Tools {
   }
 
   /* The trigger as it is set: {source, edge, level}. */
-  get wanted() {
+  get set() {
     return { source: this.source.value, edge: this.edge.value, level: Number(this.level.value) || 0 };
   }
 
   arm() {
-    const trace = this.byId && this.byId.get(this.source.value);
+    const trace = this.byId.get(this.source.value);
     this.edgeRow.hidden = !trace;
     this.levelRow.hidden = !trace || trace.level;
     this.trigger.details.classList.toggle("armed", this.mode.value !== "off");
-    this.scope.arm(this.mode.value === "off" ? null : { ...this.wanted, mode: this.mode.value });
+    this.scope.arm(this.mode.value === "off" ? null : { ...this.set, mode: this.mode.value });
   }
 
   disarm() {
@@ -206,6 +222,7 @@ export class Tools {
     this.trigger.details.classList.remove("armed");
   }
 
+  /** @param {string} text */
   say(text) {
     this.found.textContent = text;
   }
@@ -241,7 +258,11 @@ export class Tools {
 
   /* -- what is shown ------------------------------------------------------------------------------------- */
 
-  /* The labels of the lanes, beside them. */
+  /**
+   * The labels of the lanes, beside them.
+   * @param {HTMLElement} place
+   * @param {import("./scope_plot.js").Plot} plot
+   */
   label(place, plot) {
     place.replaceChildren(
       ...plot.lanes.map((lane) =>
@@ -282,31 +303,44 @@ export class Tools {
     );
   }
 
-  /* Readings at the cursors, or of the present: values are [a, b] by trace id. */
+  /**
+   * Readings at the cursors, or of the present: values are [a, b] by trace id.
+   * @param {HTMLElement} place
+   * @param {Record<string, any>} values
+   * @param {(number | null)[]} cursors
+   * @param {View} view
+   * @param {boolean} following
+   */
   read(place, values, cursors, view, following) {
-    this.followKey.setAttribute("aria-pressed", following);
+    this.followKey.setAttribute("aria-pressed", String(following));
     this.cursorKey.setAttribute(
       "aria-pressed",
-      cursors.some((at) => at !== null),
+      String(cursors.some((at) => at !== null)),
     );
     this.span.textContent = showSpan(view.end - view.begin);
-    for (const name of place.querySelectorAll(".scope-name")) {
+    for (const name of /** @type {Part} */ (place).querySelectorAll(".scope-name")) {
       const trace = this.byId.get(name.dataset.trace),
         reading = values[name.dataset.trace];
+      /** @param {any} value */
       const show = (value) =>
-        value === null || value === undefined ? "\u2013" : trace.level ? String(value) : showNumber(value);
+        value === null || value === undefined ? "\u2013" : trace?.level ? String(value) : showNumber(value);
       const [a, b] = reading || [];
       let text = reading ? show(a) : "";
       if (reading && cursors[1] !== null) {
         text = cursors[0] === null ? show(b) : `${show(a)} \u2192 ${show(b)}`;
-        if (cursors[0] !== null && !trace.level && a !== null && b !== null) text += `\n\u0394 ${showNumber(b - a)}`;
+        if (cursors[0] !== null && !trace?.level && a !== null && b !== null) text += `\n\u0394 ${showNumber(b - a)}`;
       }
       const cell = name.querySelector(".scope-value");
       if (cell.textContent !== text) cell.textContent = text;
     }
   }
 
-  /* The strip of the two cursors. */
+  /**
+   * The strip of the two cursors.
+   * @param {HTMLElement} strip
+   * @param {(number | null)[]} cursors
+   * @param {View} view
+   */
   differ(strip, cursors, view) {
     strip.hidden = cursors.every((at) => at === null);
     if (strip.hidden) return;

@@ -12,6 +12,7 @@ const RAW = "raw";
 part("terminal", (box) => {
   const facts = JSON.parse(box.dataset.lines);
   const names = Object.keys(facts);
+  /** @param {string} name */
   const role = (name) => box.querySelector(`[data-role="${name}"]`);
   const rows = role("rows");
   const talk = box.querySelector(".talk");
@@ -21,19 +22,24 @@ part("terminal", (box) => {
   const numbers = role("numbers");
   let line = names.includes(remembered("line")) ? remembered("line") : names[0];
   let next = 0;
+  /** @type {number | null} */
   let cut = null;
   let asking = false;
   let looked = 0;
+  /** @type {number | null} */
   let seen = null;
   let timer = 0;
   let kept = 0;
-  let unkept = null; // a draft that is kept soon
+  /** @type {[string, string, string] | null} a draft that is kept soon */
+  let unkept = null;
+  /** @type {string[]} */
   let said = [];
   let back = 0;
   let over = ""; // a file that is to be replaced
 
   // -- what was said --
 
+  /** @param {any} one */
   function row(one) {
     const element = document.createElement("div");
     element.className = `said${one.sender ? "" : " host"}${one.wrong ? " wrong" : ""}`;
@@ -89,9 +95,9 @@ part("terminal", (box) => {
       }
       cut = told.cut;
       const stay = !atEnd();
-      while (rows.lastChild && Number(rows.lastChild.dataset.number) >= told.first) rows.lastChild.remove();
+      for (let last; (last = rows.lastElementChild) && Number(last.dataset.number) >= told.first;) last.remove();
       for (const one of told.rows) rows.append(row(one));
-      while (rows.children.length > MOST) rows.firstChild.remove();
+      while (rows.children.length > MOST) rows.firstElementChild.remove();
       next = told.next;
       if (!rows.children.length && !rows.dataset.empty) rows.dataset.empty = "yes";
       if (!stay) toEnd();
@@ -114,13 +120,14 @@ part("terminal", (box) => {
     }, wait);
   }
 
+  /** @param {string} name */
   function choose(name) {
     keepNow();
     line = name;
     remember("line", name);
     for (const tab of box.querySelectorAll("[data-line]")) tab.setAttribute("aria-selected", tab.dataset.line === name ? "true" : "false");
     for (const end of box.querySelectorAll("[data-ends]")) end.hidden = end.dataset.ends !== name;
-    to.replaceChildren(...facts[name].units.map((unit) => new Option(unit, unit)), new Option("bytes", RAW));
+    to.replaceChildren(...facts[name].units.map((/** @type {string} */ unit) => new Option(unit, unit)), new Option("bytes", RAW));
     const { host } = facts[name]; // a unit of the cell: nobody else may speak
     for (const one of [to, text, role("say").querySelector("button"), script]) one.disabled = host !== null;
     text.placeholder = host === null ? "Command" : `${host} is the host of this line: send to ${host}`;
@@ -140,10 +147,10 @@ part("terminal", (box) => {
   // -- what waits while the cell stands --
 
   function queue() {
-    const mine = (get("queue") || []).filter((one) => one[1] === line);
+    const mine = (get("queue") || []).filter((/** @type {any[]} */ one) => one[1] === line);
     const shelf = role("waits");
     shelf.hidden = !mine.length;
-    shelf.replaceChildren(...mine.map(([number, , unit, written]) => {
+    shelf.replaceChildren(...mine.map((/** @type {[number, string, string, string]} */ [number, , unit, written]) => {
       const row = document.createElement("div");
       const who = document.createElement("span");
       who.className = "quiet";
@@ -176,13 +183,13 @@ part("terminal", (box) => {
       return;
     }
     const written = text.value.trim();
-    const found = (facts[line].words[to.value] || []).find(([spelling]) => written.startsWith(spelling));
+    const found = (facts[line].words[to.value] || []).find((/** @type {string[]} */ [spelling]) => written.startsWith(spelling));
     if (!found) {
       here.textContent = written ? "" : facts[line].added;
       return;
     }
     const [, ...rows] = found;
-    rows.forEach((row, n) => {
+    rows.forEach((/** @type {string} */ row, /** @type {number} */ n) => {
       const name = document.createElement("b");
       const colon = row.indexOf(": ");
       name.textContent = row.slice(0, colon).trim();
@@ -298,7 +305,7 @@ part("terminal", (box) => {
   role("stop").addEventListener("click", () => call("stop_script", line).catch((error) => toast(error.message, "error")));
   role("file").addEventListener("focus", async () => {
     const files = await call("files", [".txt", ".script"]).catch(() => []);
-    box.querySelector("#scripts").replaceChildren(...files.map((name) => new Option(name)));
+    box.querySelector("#scripts").replaceChildren(...files.map((/** @type {string} */ name) => new Option(name)));
   });
   let opened = ""; // the text of the file, as it was opened or saved
   role("open").addEventListener("click", async () => {

@@ -4,6 +4,7 @@ import { pitch } from "./forms.js";
 
 const { part, on, frame, call, toast, seconds, get, turnTime } = window.detent;
 
+/** @type {Record<string, string>} */
 const COLOURS = { error: "#ff6b5e", caution: "#ffd84d", power: "#ffb02e", action: "#7fe3d0", breakpoint: "#ff8ad0", stored: "#8fb8ff" };
 const LEFT = 10; // px of air at both ends
 
@@ -12,9 +13,11 @@ part("timeline", (box) => {
   const tag = document.createElement("div");
   tag.className = "tag";
   box.append(canvas, tag);
-  const pen = canvas.getContext("2d");
+  const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  /** @type {[number, string, string, string][]} when, kind, unit, words */
   let marks = [];
-  let wanted = null; // where a hand holds the time, until the cell is there
+  /** @type {number | null} where a hand holds the time, until the cell is there */
+  let held = null;
   let asking = false;
   let dragging = false;
   let due = true;
@@ -24,14 +27,16 @@ part("timeline", (box) => {
   const begin = () => get("begin") || 0;
   const end = () => Math.max(get("end") || 0, get("now") || 0, begin() + 1e6);
   const width = () => Math.max(1, canvas.clientWidth - 2 * LEFT);
+  /** @param {number} t */
   const x = (t) => LEFT + ((t - begin()) / (end() - begin())) * width();
+  /** @param {number} px */
   const t = (px) => Math.round(begin() + Math.max(0, Math.min(1, (px - LEFT) / width())) * (end() - begin()));
 
   function draw() {
     due = false;
     const wide = canvas.clientWidth;
     const high = canvas.clientHeight;
-    const now = wanted === null ? get("now") || 0 : wanted;
+    const now = held === null ? get("now") || 0 : held;
     const span = end() - begin();
     const every = pitch(span, Math.max(2, wide / 92));
     const first = Math.ceil(begin() / every) * every;
@@ -72,7 +77,8 @@ part("timeline", (box) => {
       if (px + half < wide && px - half > 0) pen.fillText(text, px - half, 27);
       else if (px - half <= 0) pen.fillText(text, 2, 27);
     }
-    let last = {};
+    /** @type {Record<string, number>} */
+    const last = {};
     for (const [at, kind] of marks) {
       const px = Math.round(x(at));
       if (px < 0 || px > wide || last[kind] === px) continue;
@@ -101,23 +107,23 @@ part("timeline", (box) => {
     box.setAttribute("aria-valuetext", `${(now / 1e9).toFixed(6)} s`);
   }
 
-  /** Take the cell to `wanted`; while it is on its way the newest wish is kept, no queue of them. */
+  /** Take the cell to `held`; while it is on its way the newest wish is kept, no queue of them. */
   async function follow() {
     if (asking) return;
     asking = true;
     try {
-      while (wanted !== null) {
-        const aim = wanted;
+      while (held !== null) {
+        const aim = held;
         await call("rewind", aim);
-        if (wanted === aim && !dragging) wanted = null;
-        else if (wanted === aim) break;
+        if (held === aim && !dragging) held = null;
+        else if (held === aim) break;
       }
     } catch (error) {
-      wanted = null;
+      held = null;
       toast(error.message, "error");
     }
     asking = false;
-    if (dragging && wanted !== null && wanted !== get("now")) return;
+    if (dragging && held !== null && held !== get("now")) return;
     plan();
   }
 
@@ -128,15 +134,18 @@ part("timeline", (box) => {
     }
   }
 
+  /** @param {number} px */
   function near(px) {
     let best = null;
+    let least = 7; // px
     for (const mark of marks) {
       const far = Math.abs(x(mark[0]) - px);
-      if (far < 7 && (best === null || far < best[1])) best = [mark, far];
+      if (far < least) [best, least] = [mark, far];
     }
-    return best && best[0];
+    return best;
   }
 
+  /** @param {PointerEvent} event */
   function point(event) {
     const px = event.clientX - box.getBoundingClientRect().left;
     const mark = near(px);
@@ -153,21 +162,21 @@ part("timeline", (box) => {
     box.focus({ preventScroll: true });
     box.setPointerCapture(event.pointerId);
     dragging = true;
-    wanted = point(event);
+    held = point(event);
     follow();
     plan();
   });
   box.addEventListener("pointermove", (event) => {
     const at = point(event);
     if (!dragging) return;
-    wanted = at;
+    held = at;
     follow();
     plan();
   });
   const drop = () => {
     if (!dragging) return;
     dragging = false;
-    if (wanted !== null) follow();
+    if (held !== null) follow();
     tag.classList.remove("shown");
   };
   box.addEventListener("pointerup", drop);
@@ -175,14 +184,16 @@ part("timeline", (box) => {
   box.addEventListener("pointerleave", () => dragging || tag.classList.remove("shown"));
   box.addEventListener("keydown", (event) => {
     const coarse = (end() - begin()) / 100;
-    const far = { ArrowLeft: -coarse, ArrowRight: coarse, PageUp: -10 * coarse, PageDown: 10 * coarse }[event.key];
+    /** @type {Record<string, number>} */
+    const keys = { ArrowLeft: -coarse, ArrowRight: coarse, PageUp: -10 * coarse, PageDown: 10 * coarse };
+    const far = keys[event.key];
     let aim = null;
-    if (far) aim = (wanted ?? get("now") ?? 0) + far;
+    if (far) aim = (held ?? get("now") ?? 0) + far;
     else if (event.key === "Home") aim = begin();
     else if (event.key === "End") aim = end();
     if (aim === null) return;
     event.preventDefault();
-    wanted = Math.round(Math.max(begin(), Math.min(end(), aim)));
+    held = Math.round(Math.max(begin(), Math.min(end(), aim)));
     follow();
     plan();
   });
@@ -212,8 +223,7 @@ part("waiting", (chip) => on("queue", (key, value) => {
 
 part("branches", (chip) => {
   chip.addEventListener("click", () => {
-    /** @type {HTMLDialogElement} */
-    const futures = document.querySelector("dialog.futures");
+    const futures = /** @type {HTMLDialogElement} */ (document.querySelector("dialog.futures"));
     futures.showModal();
   });
   return on("branches", (key, value) => {
@@ -226,7 +236,7 @@ part("branches", (chip) => {
 part("futures", (dialog) => {
   dialog.querySelector("[data-close]").addEventListener("click", () => dialog.close());
   return on("branches", (key, value) => {
-    dialog.querySelector("ul").replaceChildren(...(value || []).map(([number, at, end]) => {
+    dialog.querySelector("ul").replaceChildren(...(value || []).map((/** @type {[number, number, number]} */ [number, at, end]) => {
       const item = document.createElement("li");
       const what = document.createElement("span");
       what.textContent = `left at ${seconds(at)} s, had come to ${seconds(end)} s`;

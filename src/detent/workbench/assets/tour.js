@@ -12,6 +12,7 @@ const STOPS = [
 ];
 
 // where a machine hangs on real pins, some of this is otherwise
+/** @type {Record<string, string>} */
 const REAL = {
   "Welcome to the workbench": "The controllers of a machine on real pins, as they stand now. What you do here is done there, and nothing of it is taken back; STOP, above every page, stops every board at once. Six short stops.",
   "Switches, inputs, wires": "Click a strap or an input without a wire to change it. Inputs of a board have the level of their pins, and only a hand at the machine changes it.",
@@ -19,18 +20,20 @@ const REAL = {
   "Drag back": "The past is kept. Drag the time line back, and you see the cell as it was then; the machine goes on meanwhile. Press go, and you are at its present again.",
 };
 
-let box = null;
-let spot = null;
+/** @type {{box: Part, spot: HTMLElement} | null} what is on the page while the tour is */
+let shown = null;
 let at = 0;
 
 function end() {
   remember("tour", "seen");
-  box?.remove();
-  spot?.remove();
-  box = spot = null;
+  shown?.box.remove();
+  shown?.spot.remove();
+  shown = null;
 }
 
 function show() {
+  if (!shown) return;
+  const { box, spot } = shown;
   const [selector, title, text] = STOPS[at];
   const target = selector ? document.querySelector(selector) : null;
   box.querySelector("h2").textContent = title;
@@ -54,17 +57,18 @@ function show() {
 }
 
 function start() {
-  if (box) return;
+  if (shown) return;
   at = 0;
-  spot = document.createElement("div");
+  const spot = document.createElement("div");
   spot.className = "tour-spot";
-  box = document.createElement("section");
+  const box = /** @type {Part} */ (document.createElement("section"));
   box.className = "tour";
   box.setAttribute("role", "dialog");
   box.setAttribute("aria-label", "Guided tour");
   box.innerHTML = `<h2></h2><p></p><div class="row"><button class="key small bare skip">Skip</button><span class="quiet count"></span>
     <span class="row"><button class="key small before">Back</button><button class="key small primary next"></button></span></div>`;
   document.body.append(spot, box);
+  shown = { box, spot };
   box.querySelector(".skip").addEventListener("click", end);
   box.querySelector(".before").addEventListener("click", () => {
     at -= 1;

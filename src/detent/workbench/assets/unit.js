@@ -1,27 +1,35 @@
 // The page Unit: the unit that is chosen, filled into the markup of detent/workbench/pages/unit.py.
 
+import { worded } from "./elements.js";
 import { holding } from "./holding.js";
 
 const { part, on, get, call, meant, make, toast, remembered, remember, seconds, grouped } = window.detent;
+
+/** @typedef {[string, string | null, string, boolean]} Told name, value, where it is from, whether it is a lamp */
 
 const MOST = 800; // rows on the page
 const ARMED = 3000; // ms in which a second click is a yes
 
 part("unit", (box) => {
   const facts = JSON.parse(box.dataset.facts);
+  /** @param {string} name */
   const role = (name) => box.querySelector(`[data-role="${name}"]`);
+  /** @param {string} selector */
   const all = (selector) => [...box.querySelectorAll(selector)];
   const rows = role("rows");
   const form = role("connect");
-  let chosen = null; // a name; null: the form
+  /** @type {string | null} a name; null: the form */
+  let chosen = null;
   let next = 0;
   let asking = false;
   let again = false;
+  /** @type {{button: HTMLElement, text: string | null, timer: number} | null} a key that asks whether one is sure */
   let armed = null;
   let seen = "";
 
   const names = () => get("r.names") || [];
   const now = () => (chosen === null ? null : get(`r.${chosen}`));
+  /** @param {() => any} action */
   const tried = async (action) => {
     try {
       return await action();
@@ -31,14 +39,12 @@ part("unit", (box) => {
     }
   };
 
-  function element(tag, name, text) {
-    const made = document.createElement(tag);
-    if (name) made.className = name;
-    if (text !== undefined) made.textContent = text;
-    return made;
-  }
-
-  /** The first click asks, the second within three seconds does it. */
+  /**
+   * The first click asks, the second within three seconds does it.
+   * @param {any} button
+   * @param {string} why
+   * @param {() => any} action
+   */
   function sure(button, why, action) {
     if (armed && armed.button === button) {
       disarm();
@@ -66,16 +72,20 @@ part("unit", (box) => {
     const there = names();
     if (chosen !== null && !there.includes(chosen)) choose(there[0] ?? null);
     else if (chosen === null && there.length && !box.dataset.asked) choose(there.includes(remembered("unit")) ? remembered("unit") : there[0]);
-    role("tabs").replaceChildren(...there.map((name) => tab(name, name)), tab(null, "Connect\u2026"));
+    role("tabs").replaceChildren(...there.map((/** @type {string} */ name) => tab(name, name)), tab(null, "Connect\u2026"));
     besides();
   }
 
+  /**
+   * @param {string | null} name
+   * @param {string} text
+   */
   function tab(name, text) {
-    const made = element("button", "", "");
+    const made = worded("button", "", "");
     made.type = "button";
     made.setAttribute("role", "tab");
     made.setAttribute("aria-selected", name === chosen ? "true" : "false");
-    made.append(element("b", "", text));
+    made.append(worded("b", "", text));
     made.addEventListener("click", () => {
       box.dataset.asked = "yes";
       choose(name);
@@ -83,6 +93,7 @@ part("unit", (box) => {
     return made;
   }
 
+  /** @param {string | null} name */
   function choose(name) {
     held.letGo();
     disarm();
@@ -105,24 +116,40 @@ part("unit", (box) => {
   async function places() {
     const told = await tried(() => call("unit_places"));
     if (!told || chosen !== null) return;
+    /**
+     * @param {string} text
+     * @param {string} more
+     * @param {() => void} pick
+     */
     const row = (text, more, pick) => {
-      const made = element("button", "key small", "");
+      const made = worded("button", "key small", "");
       made.type = "button";
-      made.append(element("b", "mono", text), element("span", "quiet", more));
+      made.append(worded("b", "mono", text), worded("span", "quiet", more));
       made.addEventListener("click", pick);
       return made;
     };
+    /** @param {string} name */
     const field = (name) => form.elements[name];
-    const fill = (kind, made, none) => role(kind).replaceChildren(...(made.length ? made : [element("p", "quiet", none)]));
-    fill("ports", told.ports.map(([device, what]) => row(device, what, () => {
+    /**
+     * @param {string} kind
+     * @param {Part[]} made
+     * @param {string} none
+     */
+    const fill = (kind, made, none) => role(kind).replaceChildren(...(made.length ? made : [worded("p", "quiet", none)]));
+    fill("ports", told.ports.map((/** @type {string[]} */ [device, what]) => row(device, what, () => {
       field("address").value = device;
       field("address").focus();
     })), "No serial port is plugged in. A port of another computer is HOST:PORT, or rfc2217://HOST:PORT.");
-    fill("cell", told.cell.map(([name, model, address, options]) => row(name, `${model} at ${address} ${options}`, () => connect(model, address, options, `${name} (cell)`))),
+    fill("cell", told.cell.map((/** @type {string[]} */ [name, model, address, options]) => row(name, `${model} at ${address} ${options}`, () => connect(model, address, options, `${name} (cell)`))),
       "No unit of this cell has an endpoint.");
-    box.querySelector("#ports").replaceChildren(...told.ports.map(([device, what]) => new Option(what, device)));
+    box.querySelector("#ports").replaceChildren(...told.ports.map((/** @type {string[]} */ [device, what]) => new Option(what, device)));
   }
 
+  /**
+   * @param {string} model
+   * @param {string} address
+   * @param {string} options
+   */
   async function connect(model, address, options, name = "") {
     const made = await tried(() => call("unit_connect", model, address, options, name));
     if (made) choose(made);
@@ -167,11 +194,12 @@ part("unit", (box) => {
     const print = JSON.stringify(told.facts);
     if (print !== seen) {
       seen = print;
-      role("lamps").replaceChildren(...told.facts.filter((one) => one[3]).map(lamp));
-      role("facts").replaceChildren(...told.facts.filter((one) => !one[3]).flatMap(([name, value, source]) => {
-        const words = element("dd", value === null ? "unknown" : "mono", value === null ? "unknown" : value);
+      role("lamps").replaceChildren(...told.facts.filter((/** @type {Told} */ one) => one[3]).map(lamp));
+      /** @param {any} one */
+      role("facts").replaceChildren(...told.facts.filter((/** @type {Told} */ one) => !one[3]).flatMap((/** @type {Told} */ [name, value, source]) => {
+        const words = worded("dd", value === null ? "unknown" : "mono", value === null ? "unknown" : value);
         words.dataset.help = source;
-        return [element("dt", "", name), words];
+        return [worded("dt", "", name), words];
       }));
     }
     role("pause").setAttribute("aria-pressed", told.paused ? "true" : "false");
@@ -185,23 +213,26 @@ part("unit", (box) => {
     soon();
   }
 
+  /** @param {Told} told */
   function lamp([name, value, source]) {
-    const made = element("span", value === null ? "lamp unknown" : "lamp");
+    const made = worded("span", value === null ? "lamp unknown" : "lamp");
     made.dataset.value = value === null ? "" : value;
     made.dataset.help = `${name}: ${value === null ? "unknown" : value} (${source})`;
-    made.append(element("i", "led"), element("span", "", name), element("b", "num", value === null ? "?" : value));
+    made.append(worded("i", "led"), worded("span", "", name), worded("b", "num", value === null ? "?" : value));
     return made;
   }
 
   role("again").addEventListener("click", () => tried(() => call("unit_again", chosen)));
   role("leave").addEventListener("click", () => tried(() => call("unit_leave", chosen)));
   const paused = () => meant(`r.${chosen}.paused`, now().paused);
+  /** @param {boolean} pause */
   const ask = (pause) => make(`r.${chosen}.paused`, pause, () => tried(() => call("unit_asking", chosen, pause, Number(role("rates").value))));
   role("pause").addEventListener("click", () => ask(!paused()));
   role("rates").addEventListener("change", () => ask(paused()));
 
   // -- hands --
 
+  /** @param {any} told */
   function hands(told) {
     const busy = Boolean(told.job || told.lost || told.stopping);
     for (const one of all(".hand [data-jog], .hand [data-role=go], .hand [data-role=zero]")) one.disabled = busy;
@@ -229,7 +260,10 @@ part("unit", (box) => {
     show();
   });
 
-  /** What a field says, in whole steps; null with a word where it is no number. */
+  /**
+   * What a field says, in whole steps; null with a word where it is no number.
+   * @param {string} name
+   */
   function steps(name) {
     const value = Number(role(name).value);
     if (role(name).value === "" || !Number.isFinite(value)) {
@@ -239,6 +273,10 @@ part("unit", (box) => {
     return Math.round(value * (lead() || 1));
   }
 
+  /**
+   * @param {string} what
+   * @param {number} value
+   */
   async function hand(what, value) {
     const sent = await tried(() => call("unit_move", chosen, what, value));
     if (sent) role("sent").textContent = sent.length ? `sent ${sent.join(", ")}` : "nothing had to be sent";
@@ -257,6 +295,7 @@ part("unit", (box) => {
     () => hand("home", Number(role("direction").value))));
   role("stop").addEventListener("click", () => stopped(call("unit_stop", chosen)));
 
+  /** @param {Promise<string>} stopping */
   async function stopped(stopping) {
     held.letGo(false);
     const told = await tried(() => stopping);
@@ -264,7 +303,7 @@ part("unit", (box) => {
   }
 
   const held = holding(all("[data-hold]"), {
-    name: () => chosen,
+    name: () => chosen ?? "",
     rate: (button) => {
       const speed = Number(role("speed").value);
       if (speed > 0) return speed * Number(button.dataset.hold);
@@ -277,18 +316,19 @@ part("unit", (box) => {
 
   // -- the line --
 
+  /** @param {any} one */
   function row(one) {
-    const made = element("div", `said${one.sender ? "" : " host"}${one.wrong ? " wrong" : ""}${one.question ? " question" : ""}`);
+    const made = worded("div", `said${one.sender ? "" : " host"}${one.wrong ? " wrong" : ""}${one.question ? " question" : ""}`);
     made.dataset.number = one.number;
-    made.append(element("span", "when", seconds(one.begin)), element("span", "who", one.sender ? "unit:" : "host:"));
-    const what = element("span", "what");
+    made.append(worded("span", "when", seconds(one.begin)), worded("span", "who", one.sender ? "unit:" : "host:"));
+    const what = worded("span", "what");
     for (const [kind, shown, meaning, hex] of one.parts) {
-      const chip = element("span", `chip ${kind}`, shown);
+      const chip = worded("span", `chip ${kind}`, shown);
       chip.dataset.help = `${meaning || kind} \u00b7 ${hex}`;
-      chip.append(element("i", "", hex));
+      chip.append(worded("i", "", hex));
       what.append(chip);
     }
-    if (one.note) what.append(element("span", "note", one.note));
+    if (one.note) what.append(worded("span", "note", one.note));
     made.append(what);
     return made;
   }
@@ -306,9 +346,9 @@ part("unit", (box) => {
         const told = await call("unit_talk", mine, next);
         if (mine !== chosen) break;
         const stay = rows.scrollHeight - rows.scrollTop - rows.clientHeight > 40;
-        while (rows.lastChild && Number(rows.lastChild.dataset.number) >= told.first) rows.lastChild.remove();
+        for (let last; (last = rows.lastElementChild) && Number(last.dataset.number) >= told.first;) last.remove();
         rows.append(...told.rows.map(row));
-        while (rows.children.length > MOST) rows.firstChild.remove();
+        while (rows.children.length > MOST) rows.firstElementChild.remove();
         next = told.next;
         if (!stay) rows.scrollTop = rows.scrollHeight;
       } while (again);
@@ -322,8 +362,8 @@ part("unit", (box) => {
   function besides() {
     const select = role("beside");
     const before = select.value;
-    const others = names().filter((name) => name !== chosen);
-    select.replaceChildren(new Option("to it alone", ""), ...others.map((name) => new Option(`and to ${name}`, name)));
+    const others = names().filter((/** @type {string} */ name) => name !== chosen);
+    select.replaceChildren(new Option("to it alone", ""), ...others.map((/** @type {string} */ name) => new Option(`and to ${name}`, name)));
     select.value = others.includes(before) ? before : "";
     select.hidden = !others.length;
   }
@@ -331,7 +371,7 @@ part("unit", (box) => {
   function hint() {
     const told = now();
     const written = role("text").value.trim();
-    const found = told && (facts[told.model].words || []).find(([spelling]) => written && written.startsWith(spelling));
+    const found = told && (facts[told.model].words || []).find((/** @type {string[]} */ [spelling]) => written && written.startsWith(spelling));
     role("hint").textContent = found ? found.slice(1).join("   or   ") : written ? "" : "What the protocol adds is added: checksum, end, name, the echo of each character.";
   }
 
@@ -351,26 +391,34 @@ part("unit", (box) => {
     answers(line, Array.isArray(told) ? told : [told]);
   });
 
+  /**
+   * @param {string} line
+   * @param {any} told
+   */
   function answers(line, told) {
-    const table = element("table", "");
+    const table = worded("table", "");
     for (const one of told) {
-      const made = element("tr", one.refused ? "wrong" : "");
-      made.append(element("td", "quiet", one.unit), element("td", "mono", one.answers.join("  ") || "\u2013"), element("td", "", one.meaning),
-        element("td", "num", one.ms === null ? "" : `${one.ms} ms`));
+      const made = worded("tr", one.refused ? "wrong" : "");
+      made.append(worded("td", "quiet", one.unit), worded("td", "mono", one.answers.join("  ") || "\u2013"), worded("td", "", one.meaning),
+        worded("td", "num", one.ms === null ? "" : `${one.ms} ms`));
       table.append(made);
     }
-    const parts = [element("div", "asked", ""), table];
-    parts[0].append(element("b", "mono", line));
+    const parts = [worded("div", "asked", ""), table];
+    parts[0].append(worded("b", "mono", line));
     if (told.length > 1) {
       const same = JSON.stringify(told[0].answers) === JSON.stringify(told[1].answers) && told[0].refused === told[1].refused;
       const by = told[0].ms !== null && told[1].ms !== null ? `, ${(told[0].ms - told[1].ms).toFixed(1)} ms between them` : "";
-      parts[0].append(element("span", same ? "same" : "differ", same ? ` the same answers${by}` : ` they differ${by}`));
+      parts[0].append(worded("span", same ? "same" : "differ", same ? ` the same answers${by}` : ` they differ${by}`));
     }
     role("answers").replaceChildren(...parts);
   }
 
   role("hex").addEventListener("click", () => toggle("hex", "with-hex"));
   role("polls").addEventListener("click", () => toggle("polls", "with-polls"));
+  /**
+   * @param {string} name
+   * @param {string} style
+   */
   function toggle(name, style) {
     const on = rows.classList.toggle(style);
     role(name).setAttribute("aria-pressed", on ? "true" : "false");
@@ -378,6 +426,7 @@ part("unit", (box) => {
 
   // -- program and backup --
 
+  /** @param {string} text */
   const tell = (text) => (role("told").textContent = text);
   const source = () => role("source").value;
 
@@ -408,7 +457,7 @@ part("unit", (box) => {
   const file = () => role("file").value.trim() || `${now().model}-backup.toml`;
   role("file").addEventListener("focus", async () => {
     const files = await call("files", [".toml"]).catch(() => []);
-    box.querySelector("#backups").replaceChildren(...files.map((name) => new Option(name)));
+    box.querySelector("#backups").replaceChildren(...files.map((/** @type {string} */ name) => new Option(name)));
   });
   role("file").addEventListener("input", () => (role("restore").hidden = true));
   role("backup").addEventListener("click", async () => {

@@ -7,7 +7,11 @@ const { part, on } = window.detent;
 const OUTSIDE = 46; // px beside the outermost panels, at most
 const NS = "http://www.w3.org/2000/svg";
 
-/** The panels in `box`, and the gaps: columns between them as [left, right]. */
+/**
+ * The panels in `box`, and the gaps: columns between them as [left, right].
+ * @param {Part} box
+ * @param {DOMRect} frame
+ */
 function gaps(box, frame) {
   const cards = [...box.querySelectorAll(".panel")].map((card) => {
     const at = card.getBoundingClientRect();
@@ -20,6 +24,7 @@ function gaps(box, frame) {
     return { left, right: Math.max(...mine.map((card) => card.right)) };
   });
   const last = columns[columns.length - 1].right;
+  /** @type {Point[]} */
   const between = columns.map((column, n) => [n ? columns[n - 1].right : Math.max(0, column.left - OUTSIDE), column.left]);
   between.push([last, Math.min(frame.width, last + OUTSIDE)]);
   for (const one of cards) one.column = lefts.indexOf(Math.round(one.left));
@@ -28,10 +33,13 @@ function gaps(box, frame) {
 
 part("wires", (box) => {
   const svg = box.querySelector("svg.wires");
+  /** @type {[string, string[]][]} */
   const wires = JSON.parse(box.dataset.wires);
+  /** @type {End[]} */
   let ends = [];
   let planned = 0;
 
+  /** @param {string} name */
   function jack(name) {
     const element = box.querySelector(`[data-jack="${CSS.escape(name)}"]`);
     if (!element) return null;
@@ -44,14 +52,20 @@ part("wires", (box) => {
     const frame = box.getBoundingClientRect();
     if (!frame.width) return;
     const { cards, between } = gaps(box, frame);
+    /** @param {any} end */
     const place = (end) => {
-      const card = cards.find((one) => one.card === end.card);
-      const gap = end.side === "left" ? card.column : card.column + 1;
+      const column = cards.find((one) => one.card === end.card)?.column ?? 0;
+      const gap = end.side === "left" ? column : column + 1;
       return { x: end.dot.left + end.dot.width / 2 - frame.left, y: end.dot.top + end.dot.height / 2 - frame.top, gap };
     };
     // which wire uses which gaps
+    /** @type {{wire: number, a: {x: number, y: number, gap: number}, b: {x: number, y: number, gap: number}, passage: Point | null}[]} */
     const routes = [];
     const users = new Map(); // gap or passage -> the wires in it, in order
+    /**
+     * @param {any} key
+     * @param {number} wire
+     */
     const use = (key, wire) => {
       if (!users.has(key)) users.set(key, []);
       if (!users.get(key).includes(wire)) users.get(key).push(wire);
@@ -66,11 +80,13 @@ part("wires", (box) => {
         const b = place(to);
         use(a.gap, wire);
         use(b.gap, wire);
+        /** @type {Point | null} */
         let passage = null;
         if (a.gap !== b.gap) {
+          /** @param {number} gap */
           const middle = (gap) => (between[gap][0] + between[gap][1]) / 2;
           const free = passages(cards, middle(a.gap), middle(b.gap), frame.height);
-          const far = ([low, high]) => {
+          const far = (/** @type {Point} */ [low, high]) => {
             const y = (low + high) / 2;
             return Math.abs(a.y - y) + Math.abs(b.y - y);
           };
@@ -80,6 +96,13 @@ part("wires", (box) => {
         routes.push({ wire, a, b, passage });
       }
     });
+    /**
+     * @param {any} key
+     * @param {number} wire
+     * @param {number} low
+     * @param {number} high
+     * @param {number} widest
+     */
     const lane = (key, wire, low, high, widest) => {
       const all = users.get(key);
       const step = Math.min(widest, (high - low) / (all.length + 1));
@@ -124,7 +147,10 @@ part("wires", (box) => {
     }
   }
 
-  /** The key of the level at an end of a wire: a switch's, or a pin's. A motor's pins tell none. */
+  /**
+   * The key of the level at an end of a wire: a switch's, or a pin's. A motor's pins tell none.
+   * @param {string} end
+   */
   function keyOf(end) {
     const dot = end.indexOf(".");
     if (dot < 0) return `s.${end}.level`;
@@ -136,10 +162,11 @@ part("wires", (box) => {
     if (!planned) planned = requestAnimationFrame(draw);
   }
 
+  /** @param {any} event */
   const light = (event) => {
     const element = event.target.closest("[data-jack]");
     const name = element && element.dataset.jack;
-    for (const group of svg.children) {
+    for (const group of /** @type {Iterable<SVGElement>} */ (svg.children)) {
       const [source, targets] = wires.find(([from]) => from === group.dataset.wire) || ["", []];
       group.classList.toggle("lit", Boolean(name) && (source === name || targets.includes(name)));
     }

@@ -4,16 +4,25 @@
 import { FORMS, grouped, seconds } from "./forms.js";
 import { Meanings } from "./meanings.js";
 
-const values = new Map(); // the live table, as far as this window knows it
-const bound = new Map(); // key -> Set of [element, kind]
-const listeners = []; // [prefix, function]
+/** @type {Map<string, any>} the live table, as far as this window knows it */
+const values = new Map();
+/** @type {Map<string, Set<[HTMLElement, string]>>} key -> elements that show it, and how */
+const bound = new Map();
+/** @type {[string, Heard][]} prefix, function */
+const listeners = [];
+/** @type {Set<() => void>} */
 const frames = new Set();
-const parts = new Map(); // name -> setup
-const living = new Map(); // element with data-part -> what ends it
-const waiting = new Map(); // number of a call -> [resolve, reject]
+/** @type {Map<string, Setup>} */
+const parts = new Map();
+/** @type {Map<HTMLElement, End>} element with data-part -> what ends it */
+const living = new Map();
+/** @type {Map<number, [(value: any) => void, (error: Error) => void]>} number of a call -> who waits for it */
+const waiting = new Map();
 const meanings = new Meanings((key) => values.get(key));
-const opening = []; // what is called when there is a connection
+/** @type {(() => void)[]} what is called when there is a connection */
+const opening = [];
 const PATIENCE = 8000; // ms that a call waits for one
+/** @type {WebSocket | null} */
 let socket = null;
 let calls = 0;
 let pause = 250; // ms before the next attempt to connect
@@ -30,9 +39,10 @@ function connect() {
   };
   socket.onmessage = (event) => {
     const told = JSON.parse(event.data);
+    const asked = waiting.get(told.id);
     if (told.set) take(told.set);
-    else if (waiting.has(told.id)) {
-      const [resolve, reject] = waiting.get(told.id);
+    else if (asked) {
+      const [resolve, reject] = asked;
       waiting.delete(told.id);
       if ("error" in told) reject(new Error(told.error));
       else resolve(told.value);
@@ -47,20 +57,29 @@ function connect() {
   };
 }
 
-/** Make a call; it waits a while for the connection, if there is none. */
+/**
+ * Make a call; it waits a while for the connection, if there is none.
+ * @type {Detent["call"]}
+ */
 function call(name, ...args) {
   return name in STANDS ? meanings.make("held", STANDS[name], () => say(name, args)) : say(name, args);
 }
 
+/**
+ * @param {string} name
+ * @param {any[]} args
+ * @returns {Promise<any>}
+ */
 async function say(name, args) {
   if (!socket || socket.readyState !== WebSocket.OPEN) await connected();
   return new Promise((resolve, reject) => {
     calls += 1;
     waiting.set(calls, [resolve, reject]);
-    socket.send(JSON.stringify({ call: name, args, id: calls }));
+    socket?.send(JSON.stringify({ call: name, args, id: calls }));
   });
 }
 
+/** @returns {Promise<void>} kept when there is a connection */
 function connected() {
   return new Promise((resolve, reject) => {
     const late = setTimeout(() => reject(new Error("the workbench does not answer")), PATIENCE);
@@ -75,12 +94,16 @@ function connected() {
 // The table is a moment behind what was clicked. Whoever turns something over asks what it is meant to be: then the
 // second of two quick clicks takes the first one back, and none is lost.
 
+/** @type {Record<string, boolean>} */
 const STANDS = { hold: true, go: false, step_event: true, step_back: true, step_instruction: true, rewind: true, program_run_to: false };
 
 /** Time stands if it goes, and goes if it stands. */
 const turnTime = () => action(meanings.of("held") ? "go" : "hold");
 
-/** The same for a hand at the page: an error is shown, and nothing is thrown. */
+/**
+ * The same for a hand at the page: an error is shown, and nothing is thrown.
+ * @type {Detent["action"]}
+ */
 async function action(name, ...args) {
   try {
     return await call(name, ...args);
@@ -92,6 +115,7 @@ async function action(name, ...args) {
 
 // -- the table ------------------------------------------------------------------------------------------
 
+/** @param {Record<string, any>} changed */
 function take(changed) {
   for (const [key, value] of Object.entries(changed)) {
     values.set(key, value);
@@ -109,10 +133,15 @@ function take(changed) {
 
 const KINDS = ["live", "level", "var", "pressed"];
 
+/**
+ * @param {HTMLElement} element
+ * @param {string} kind one of KINDS
+ * @param {any} value
+ */
 function show(element, kind, value) {
   switch (kind) {
     case "live": {
-      const form = FORMS[element.dataset.form] || FORMS.plain;
+      const form = FORMS[element.dataset.form || "plain"] || FORMS.plain;
       const text = form(value);
       if (element.textContent !== text) element.textContent = text;
       break;
@@ -121,7 +150,7 @@ function show(element, kind, value) {
       element.dataset.value = value === null ? "" : String(value);
       break;
     case "var":
-      element.style.setProperty("--value", value === null ? 0 : value);
+      element.style.setProperty("--value", value === null ? "0" : value);
       break;
     case "pressed":
       element.setAttribute(element.getAttribute("role") === "switch" ? "aria-checked" : "aria-pressed", value ? "true" : "false");
@@ -129,35 +158,48 @@ function show(element, kind, value) {
   }
 }
 
+/** @param {HTMLElement} element */
 function bind(element) {
   for (const kind of KINDS) {
     const key = element.dataset[kind];
     if (!key) continue;
-    if (!bound.has(key)) bound.set(key, new Set());
-    bound.get(key).add([element, kind]);
+    const there = bound.get(key) || new Set();
+    there.add([element, kind]);
+    bound.set(key, there);
     if (values.has(key)) show(element, kind, values.get(key));
   }
 }
 
 const SELECTOR = KINDS.map((kind) => `[data-${kind}]`).join(",");
 
+/** @param {HTMLElement} root */
 function appear(root) {
   if (root.matches(SELECTOR)) bind(root);
-  for (const element of root.querySelectorAll(SELECTOR)) bind(element);
+  for (const element of all(SELECTOR, root)) bind(element);
   if (root.matches("[data-part]")) begin(root);
-  for (const element of root.querySelectorAll("[data-part]")) begin(element);
+  for (const element of all("[data-part]", root)) begin(element);
 }
 
+/**
+ * The elements in `root` that a selector names.
+ * @param {string} selector
+ * @param {ParentNode} root
+ * @returns {NodeListOf<HTMLElement>}
+ */
+const all = (selector, root = document) => root.querySelectorAll(selector);
+
+/** @param {HTMLElement} element */
 function begin(element) {
-  const setup = parts.get(element.dataset.part);
-  if (setup && !living.has(element)) living.set(element, setup(element) || (() => {}));
+  const setup = parts.get(element.dataset.part || "");
+  if (setup && !living.has(element)) living.set(element, setup(/** @type {Part} */ (element)) || (() => {}));
 }
 
 function watchDocument() {
+  /** @param {MutationRecord[]} records */
   const look = (records) => {
     let gone = false;
     for (const record of records) {
-      for (const node of record.addedNodes) if (node.nodeType === 1) appear(node);
+      for (const node of record.addedNodes) if (node.nodeType === 1) appear(/** @type {HTMLElement} */ (node));
       gone = gone || record.removedNodes.length > 0;
     }
     if (gone) {
@@ -173,18 +215,22 @@ function watchDocument() {
   appear(document.documentElement);
 }
 
+/** @type {Detent["part"]} */
 function part(name, setup) {
   parts.set(name, setup);
-  for (const element of document.querySelectorAll(`[data-part="${name}"]`)) begin(element);
+  for (const element of all(`[data-part="${name}"]`)) begin(element);
 }
 
+/** @type {Detent["on"]} */
 function on(prefix, heard) {
+  /** @type {[string, Heard]} */
   const entry = [prefix, heard];
   listeners.push(entry);
   for (const [key, value] of values) if (key.startsWith(prefix)) heard(key, value);
   return () => listeners.splice(listeners.indexOf(entry), 1);
 }
 
+/** @type {Detent["frame"]} */
 function frame(drawn) {
   frames.add(drawn);
   return () => frames.delete(drawn);
@@ -192,10 +238,13 @@ function frame(drawn) {
 
 // -- help, messages -------------------------------------------------------------------------------------
 
+/** @type {HTMLElement | null} */
 let helpBox = null;
+/** @type {HTMLElement | null} */
 let helped = null;
 let helpSoon = 0;
 
+/** @param {HTMLElement} element */
 function showHelp(element) {
   const text = element.dataset.help;
   if (!text || !element.isConnected || document.querySelector(".tour")) return;
@@ -253,6 +302,7 @@ function listenForHelp() {
   document.addEventListener("focusout", hideHelp);
 }
 
+/** @type {Detent["toast"]} */
 function toast(text, kind = "note") {
   let shelf = document.getElementById("toasts");
   if (!shelf) {
@@ -268,12 +318,13 @@ function toast(text, kind = "note") {
   one.textContent = text;
   one.addEventListener("click", () => one.remove());
   shelf.append(one);
-  while (shelf.children.length > 4) shelf.firstChild.remove();
+  while (shelf.children.length > 4) shelf.firstChild?.remove();
   setTimeout(() => one.remove(), kind === "error" ? 9000 : 4000);
 }
 
 // -- actions by hand --------------------------------------------------------------------------------------
 
+/** @param {any} written */
 function argument(written) {
   if (typeof written !== "string") return written;
   if (written.startsWith("!")) return meanings.of(written.slice(1)) ? 0 : 1;
@@ -285,6 +336,7 @@ function listenForActions() {
   document.addEventListener("click", (event) => {
     const element = origin(event).closest("[data-do]");
     if (!element || element.disabled) return;
+    /** @type {any[]} */
     const written = JSON.parse(element.dataset.args || "[]");
     const args = written.map(argument);
     const turned = written.findIndex((one) => typeof one === "string" && one.startsWith("!"));
@@ -304,6 +356,7 @@ function listenForActions() {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const at = origin(event);
     if (at.closest("input, textarea, select, [contenteditable], .cm-editor, [role=dialog]")) return;
+    /** @type {Record<string, string>} */
     const keys = { ".": "step_event", ",": "step_back", "[": "slower", "]": "faster" };
     if (event.key === " ") {
       if (at.closest("button, a, summary")) return; // it is theirs
@@ -315,18 +368,18 @@ function listenForActions() {
     } else if (event.key === "?") {
       document.dispatchEvent(new CustomEvent("detent-tour"));
     } else if (/^[1-9]$/.test(event.key)) {
-      /** @type {NodeListOf<HTMLElement>} */
-      const tabs = document.querySelectorAll("nav.tabs a");
-      tabs[Number(event.key) - 1]?.click();
+      all("nav.tabs a")[Number(event.key) - 1]?.click();
     }
   });
 }
 
 // -- theme, tabs ----------------------------------------------------------------------------------------
 
+/** @type {((theme: "dark" | "light") => void)[]} */
 const themed = [];
 const darkOutside = matchMedia("(prefers-color-scheme: dark)");
 
+/** @type {Detent["remembered"]} */
 function remembered(name) {
   try {
     return localStorage.getItem(`detent.${name}`);
@@ -335,6 +388,7 @@ function remembered(name) {
   }
 }
 
+/** @type {Detent["remember"]} */
 function remember(name, value) {
   try {
     localStorage.setItem(`detent.${name}`, value);
@@ -355,6 +409,7 @@ function applyTheme() {
   for (const heard of themed) heard(now);
 }
 
+/** @type {Detent["onTheme"]} */
 function onTheme(heard) {
   themed.push(heard);
   heard(theme());
@@ -375,8 +430,9 @@ function markTab() {
 }
 
 function followTabs() {
-  for (const name of ["pushState", "replaceState"]) {
+  for (const name of /** @type {("pushState" | "replaceState")[]} */ (["pushState", "replaceState"])) {
     const before = history[name];
+    /** @param {[any, string, (string | URL | null)?]} args */
     history[name] = function (...args) {
       const result = before.apply(this, args);
       markTab();
