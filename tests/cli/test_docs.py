@@ -45,6 +45,17 @@ def test_a_checkout_whose_pages_are_not_built_says_how(project: Path, capsys: py
     assert f"make -C {project} docs" in err
 
 
-def test_elsewhere_it_is_the_address_that_the_package_names(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    status, out, _ = said(capsys, "--no-browser")
-    assert (status, out.startswith("https://")) == (0, True)
+def test_elsewhere_the_pages_lie_in_the_package(
+    project: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    index = project / "src" / "detent" / "docs" / "index.md"
+    status, out, err = said(capsys)
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert str(index.parent) in err
+    index.parent.mkdir(parents=True)
+    index.touch()
+    assert said(capsys) == (0, f"Read {index}\n", "")
+    status, out, _ = said(capsys, "--json")
+    assert (status, json.loads(out), opened) == (0, {"docs": index.as_uri()}, [])

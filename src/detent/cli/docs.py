@@ -6,7 +6,7 @@ from pathlib import Path
 def docs(*, no_browser: bool = False, json: bool = False) -> None:
     """Open the documentation in a browser, or say where it is.
 
-    In a checkout that is the site that `make docs` builds; elsewhere the address that the package names.
+    In a checkout that is the site that `make docs` builds; an installed package has the same pages as text, to be read in place.
 
     Parameters
     ----------
@@ -19,25 +19,16 @@ def docs(*, no_browser: bool = False, json: bool = False) -> None:
     import webbrowser
 
     from detent.cli.endings import failed
+    from detent.extras import how_to_install
 
-    project = Path(__file__).parents[3]
-    site = project / "docs" / "_build" / "html" / "index.html"
-    if site.is_file():
-        address = site.as_uri()
-    elif (project / "docs" / "conf.py").is_file():
+    package = Path(__file__).parents[1]
+    project = package.parents[1]
+    site, pages = project / "docs" / "_build" / "html" / "index.html", package / "docs" / "index.md"
+    if not site.is_file() and (project / "docs" / "conf.py").is_file():
         failed(f"the pages are not built: make -C {project} docs; or read {project / 'docs' / 'index.md'}")
-    else:
-        address = _told()
-    print(json_text.dumps({"docs": address}) if json else address)
-    if not (no_browser or json):
-        webbrowser.open(address)
-
-
-def _told() -> str:
-    """The address of the documentation by the package's own word."""
-    from importlib.metadata import metadata
-
-    from detent.extras import DISTRIBUTION
-
-    links = dict(link.split(", ", 1) for link in metadata(DISTRIBUTION).get_all("Project-URL", []))
-    return str(links["Documentation"])
+    if not site.is_file() and not pages.is_file():
+        failed(f"the pages are not where they were installed, in {pages.parent}: {how_to_install()}")
+    found = site if site.is_file() else pages
+    print(json_text.dumps({"docs": found.as_uri()}) if json else found.as_uri() if found == site else f"Read {found}")
+    if found == site and not (no_browser or json):
+        webbrowser.open(found.as_uri())

@@ -48,9 +48,8 @@ def markup(built: bool) -> str:
     controllers = "".join(
         f'<li><a href="/docs/controllers/{name}.html" target="_blank">{title}</a></li>'
         for name, title in (
-            ("gs-c200", "GS-C200"), ("supersigma", "SUPERSIGMA"), ("dcb-274", "DCB-274"), ("genstepper", "GenStepper")
+            ("gsc200", "GS-C200"), ("supersigma", "SUPERSIGMA"), ("dcb274", "DCB-274"), ("genstepper", "GenStepper")
         )
-        if (SITE / "controllers" / f"{name}.html").is_file()
     )  # fmt: skip
     docs = f"<ul>{links}{controllers}</ul>" if built else "<p class='quiet'>In a terminal: <kbd>detent docs</kbd></p>"
     return f"""<div class="begin" data-part="begin">
