@@ -6,7 +6,7 @@ from pathlib import Path
 def docs(*, no_browser: bool = False, json: bool = False) -> None:
     """Open the documentation in a browser, or say where it is.
 
-    In a checkout that is the site that `make docs` builds; an installed package has the same pages as text, to be read in place.
+    In a checkout that is the site that `make docs` builds; an installed package has the same pages as text.
 
     Parameters
     ----------
