@@ -17,7 +17,7 @@ from detent.cell.actions import Action, Send, TimedAction
 from detent.cell.cell import Cell
 from detent.cell.circuit import Oscillation
 from detent.cell.mechanics import Mechanics
-from detent.cell.moments import Branch, Cut, Deaf, Moment, News
+from detent.cell.moments import Branch, Cut, Moment, News, PausedLine
 from detent.cell.panel import Panel
 from detent.cell.recording import Batch, Entry
 from detent.cell.stores import Stores
@@ -78,7 +78,7 @@ class History:
         self._told = self._told_actions = 0  # batches and actions that `news` has told
         self._fresh: list[Batch] = []
         self._cut: Cut | None = None
-        self._deaf: list[Deaf] = []  # the lines, in the past
+        self._paused_lines: list[PausedLine] = []  # the lines, in the past
         self._pending: list[Send] = []  # what hosts had sent already when the present was left
         self.stopped = ""
         self.breakpoints: set[Address] = set()
@@ -130,9 +130,9 @@ class History:
         return len(self._fresh)
 
     @property
-    def lines(self) -> Sequence[Line | Deaf]:
+    def lines(self) -> Sequence[Line | PausedLine]:
         """The lines; in the past they are deaf, and hosts wait."""
-        return self.cell.lines if self._present is None else self._deaf
+        return self.cell.lines if self._present is None else self._paused_lines
 
     def next_event(self) -> Ns | None:
         """When something happens next by itself; None while it is stopped, or nobody asks for the news."""
@@ -354,13 +354,13 @@ class History:
         if self._present is None:
             self._here.writes = self._stores.writes
             self._present = self._here
-            self._deaf = [Deaf(line.take()) for line in self._here.cell.lines]
+            self._paused_lines = [PausedLine(line.take()) for line in self._here.cell.lines]
 
     def _to_present(self) -> None:
         if self._present is not None:
             self._here, self._present = self._present, None
             self._stores.writes = self._here.writes
-            for line, deaf in zip(self.cell.lines, self._deaf, strict=True):
+            for line, deaf in zip(self.cell.lines, self._paused_lines, strict=True):
                 line.heard[:0] = deaf.heard
             self._do_pending()
 

@@ -11,7 +11,7 @@ from detent.lines.line import Heard
 from detent.ticks import NEVER, Ns
 
 
-class Deaf(NamedTuple):
+class PausedLine(NamedTuple):
     """A line while the cell stands in its past: the host's bytes wait outside."""
 
     heard: list[Heard]  # what the host is still to be told of the present that was left

@@ -269,7 +269,7 @@ def _facts(service: "Service", control: str | None) -> dict[str, object]:
     }
     if service.driven is not None:
         told["boards"] = [state._asdict() for state in service.driven.board_states()]
-        told["axes"] = [axle.name for axle in service.driven.axles]
+        told["axes"] = [ledger.name for ledger in service.driven.ledgers]
     return told
 
 
@@ -283,7 +283,7 @@ def _print_ready(
         print(f"  {unit}: {line}")
     if service.driven is not None:
         for state in service.driven.board_states():
-            axes = ", ".join(axle.name for axle in service.driven.axles if axle.what.board == state.board)
+            axes = ", ".join(ledger.name for ledger in service.driven.ledgers if ledger.what.board == state.board)
             lead = service.driven.plan.lead / 1e6
             print(f"Real pins of {state.board} ({state.firmware}): {axes or 'no axis'}; {lead:g} ms behind")
     print("Connect:")

@@ -28,7 +28,7 @@ import re
 from collections.abc import Callable, Generator, Iterable, Sequence
 from typing import Final, NamedTuple, TypeAlias
 
-from detent.hosts.dcb274.handshake import BS, LF, SINGLE_LONGEST, SPOIL, Deaf, PartyLine, SingleMode, is_name
+from detent.hosts.dcb274.handshake import BS, LF, SINGLE_LONGEST, SPOIL, NotListening, PartyLine, SingleMode, is_name
 from detent.hosts.errors import DriverError, Refused
 from detent.hosts.exchange import Answer, Ask, Clear, Pause, Progress, Rest, length, until
 from detent.hosts.gsc200.frames import Frames
@@ -289,7 +289,7 @@ def _names(one: Pass, asked: _Asked) -> Search:
         try:
             # a ring sends back what it hears: data alone proves that the axis is there
             moving = yield from PartyLine(name, one.seconds).line("^", 1.0)
-        except Deaf:  # it has echoed its name, and nothing behind that
+        except NotListening:  # it has echoed its name, and nothing behind that
             found.append(Found("dcb-274", one.form, {"mode": "party", "name": name}, "runs a program, or jogs"))
             continue
         except DriverError:

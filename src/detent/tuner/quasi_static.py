@@ -152,7 +152,7 @@ def _summed(values: Floats, over: Floats) -> Floats:
     return found
 
 
-class ByHand(NamedTuple):
+class RuleOfThumb(NamedTuple):
     """Speeds (steps/s) and acceleration (steps/s2) by the rule of manuals."""
 
     start: float
@@ -160,12 +160,12 @@ class ByHand(NamedTuple):
     acceleration: float
 
 
-def by_hand(rig: Rig, torque: Torque) -> ByHand:
+def rule_of_thumb(rig: Rig, torque: Torque) -> RuleOfThumb:
     """Start at half of the pull-in rate, slew where half of the holding torque is left, ramp with half of what is."""
     start = pull_in(rig) / 2
     top = max(torque.speed_at(torque.holding / 2), 2 * start)
     spare = torque.available_at(top) / 2 - torque.steady_at(top)
-    return ByHand(max(start, 1.0), top, torque.acceleration(max(spare, 0.05 * torque.holding)))
+    return RuleOfThumb(max(start, 1.0), top, torque.acceleration(max(spare, 0.05 * torque.holding)))
 
 
 def pull_in(rig: Rig) -> float:

@@ -13,7 +13,7 @@ from detent.pulses import Train
 from detent.ramps import tick_accumulator, timer_table
 from detent.tuner import tables
 from detent.tuner.grid import Dimension, logarithmic
-from detent.tuner.quasi_static import ByHand, Torque, by_hand, torque_of, worst_of
+from detent.tuner.quasi_static import RuleOfThumb, Torque, rule_of_thumb, torque_of, worst_of
 from detent.tuner.task import Task, TunerError
 
 Point = tuple[int, ...]
@@ -99,7 +99,7 @@ def space(task: Task) -> Space:
             f"{rig.motor.name} with {rig.drive.supply:g} V and {rig.drive.current:g} A does not turn this load at any "
             f"speed: friction and load take {torque.steady_at(0):.3g} of {torque.available_at(0):.3g} Nm"
         )
-    hand = by_hand(rig, torque)
+    hand = rule_of_thumb(rig, torque)
     return _MAKE[catalogue.model(task.model).name](task, torque, hand)
 
 
@@ -111,14 +111,14 @@ class _Speeds(NamedTuple):
     acceleration: tuple[float, float]
 
     @classmethod
-    def of(cls, torque: Torque, hand: ByHand) -> "_Speeds":
+    def of(cls, torque: Torque, hand: RuleOfThumb) -> "_Speeds":
         most = torque.acceleration(max(torque.available_at(hand.start) - torque.steady_at(hand.start),
                                        0.02 * torque.holding))  # fmt: skip
         slew = max(hand.top, 2 * hand.start)
         return cls((hand.start / 5, 2 * hand.start), (slew / 2, max(torque.top, slew)), (most / 16, most))
 
 
-def _gsc200(task: Task, torque: Torque, hand: ByHand) -> Space:
+def _gsc200(task: Task, torque: Torque, hand: RuleOfThumb) -> Space:
     made, winding = task.law, task.rig.drive.winding
     start, slew, ramp = made.settings
     speeds = _Speeds.of(torque, hand)
@@ -146,7 +146,7 @@ def _gsc200(task: Task, torque: Torque, hand: ByHand) -> Space:
     )
 
 
-def _dcb274(task: Task, torque: Torque, hand: ByHand) -> Space:
+def _dcb274(task: Task, torque: Torque, hand: RuleOfThumb) -> Space:
     made, winding = task.law, task.rig.drive.winding
     settings = {setting.name: setting for setting in made.settings}
     speeds = _Speeds.of(torque, hand)
@@ -187,7 +187,7 @@ def _dcb274(task: Task, torque: Torque, hand: ByHand) -> Space:
     return Space(dimensions, profile, best, slower, ("V", "K up"), labels, admits)
 
 
-def _genstepper(task: Task, torque: Torque, hand: ByHand) -> Space:
+def _genstepper(task: Task, torque: Torque, hand: RuleOfThumb) -> Space:
     given = int(str(task.options.get("step_size", _default(task.model, "step_size"))))
     distances = [move.steps * given for move in task.moves]  # in 1/64 of a full step
     sizes = [size for size in (1, 2, 4, 8, 16, 32, 64) if all(distance % size == 0 for distance in distances)]
@@ -236,7 +236,7 @@ def _genstepper(task: Task, torque: Torque, hand: ByHand) -> Space:
     return Space(dimensions, profile, best, slower, ("R", "P"), labels, lambda point: point[1] < point[2])
 
 
-def _supersigma(task: Task, torque: Torque, hand: ByHand) -> Space:
+def _supersigma(task: Task, torque: Torque, hand: RuleOfThumb) -> Space:
     winding = task.rig.drive.winding
     weakest = min((torque_of(rig) for rig in worst_of(task.rig, task.spread)), key=lambda one: one.top)
     made = tables.Tables(task.model, task.options, weakest if weakest.top > 0 else torque)

@@ -20,7 +20,7 @@ from detent.cell.stores import Stores
 from detent.outputs.units import views
 from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.driven import Driven
-from detent.realtime.boards.leaving import CERTAIN
+from detent.realtime.boards.outgoing import CERTAIN
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.states import News, Standing, Weight
 from detent.realtime.cell_source import CellSource

@@ -22,10 +22,10 @@ from detent.realtime.system import ended_by_signals
 from detent.workbench import filing, shell
 from detent.workbench.beginning import Beginning
 from detent.workbench.board import Board
+from detent.workbench.connections import LimitedConnection
 from detent.workbench.drafts import Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.guard import Guard, names_of_this_machine
-from detent.workbench.hurried import Hurried
 from detent.workbench.listening import Listening, Place
 from detent.workbench.live import Live
 from detent.workbench.pages import Page, Window, begin, cell, motion, program, scope, terminal, unit
@@ -91,8 +91,9 @@ def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place, st
 async def serve(application: Guard, listening: Listening, ready: Callable[[], None]) -> None:
     """Serve until SIGINT, SIGTERM or SIGHUP. `ready` is called once a browser may come."""
     config = uvicorn.Config(
-        application, http=Hurried, log_level="error", lifespan="on", ws="wsproto", ws_per_message_deflate=False,
-        timeout_graceful_shutdown=PATIENCE, access_log=False, server_header=False, ws_max_size=4 << 20,
+        application, http=LimitedConnection, log_level="error", lifespan="on", ws="wsproto",
+        ws_per_message_deflate=False, timeout_graceful_shutdown=PATIENCE, access_log=False, server_header=False,
+        ws_max_size=4 << 20,
     )  # fmt: skip
     server = _Server(config)
     loop = asyncio.get_running_loop()

@@ -46,7 +46,7 @@ def test_outputs_change_with_the_pulses_they_belong_to() -> None:
         bench.run(50 * MS)
         bench.type("x", "+40")
         bench.rest()
-        motion = pulses(bench.driven.axles[0].motions.since(0), bench.cell.now)
+        motion = pulses(bench.driven.ledgers[0].motions.since(0), bench.cell.now)
         (begun, high), (over, low) = levels(bench, "gpio6")[-2:]
         assert (high, low) == (True, False)
         assert bench.cell.recording is not None
@@ -223,7 +223,7 @@ def test_a_stalled_computer_slips_once_and_loses_nothing() -> None:
         bench.run(300 * MS)
         bench.stall(60 * MS)
         bench.rest()
-        assert bench.driven.axles[0].stepper.slips == 1
+        assert bench.driven.ledgers[0].stepper.slips == 1
         assert weights(bench) == [Weight.WARNING]
         assert "slipped by" in bench.news[0].text
         assert [place for _, place in bench.edges("x")] == list(range(1, 401))
@@ -482,7 +482,7 @@ def holds(seed: int) -> None:
         bench.rest()
         state = bench.driven.axes()[0]
         assert not [news for news in bench.news if news.weight is not Weight.NOTE], bench.news
-        told = pulses(bench.driven.axles[0].motions.since(0), bench.cell.now)
+        told = pulses(bench.driven.ledgers[0].motions.since(0), bench.cell.now)
         edges = bench.edges("x")
         assert [place for _, place in edges] == [place for _, place in told]
         assert bench.position("x") == state.shaft
@@ -544,7 +544,7 @@ def test_a_plain_driver_gets_half_of_its_current_at_rest() -> None:
 def test_a_driver_that_fails_in_mid_move_stops_its_axis() -> None:
     with Bench(CELL) as bench:
         bench.run(100 * MS)
-        bench.driven.axles[0].what = bench.driven.axles[0].what._replace(driver="x.driver")
+        bench.driven.ledgers[0].what = bench.driven.ledgers[0].what._replace(driver="x.driver")
         bench.type("x", "g-")
         bench.run(500 * MS)
         before = bench.position("x")

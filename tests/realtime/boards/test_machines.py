@@ -36,10 +36,10 @@ inputs = { EOT = "^gpio12", HOME = "^gpio13" }
 
 def same_pulses(bench: Bench, stepper: str, unit: str, axis: str = "") -> int:
     """The steps on the pins are the pulses of the cell; how many."""
-    axle = next(a for a in bench.driven.axles if (a.what.unit, a.what.axis) == (unit, axis))
-    wanted = [place for _, place in pulses(axle.motions.since(0), bench.cell.now)]
+    ledger = next(a for a in bench.driven.ledgers if (a.what.unit, a.what.axis) == (unit, axis))
+    wanted = [place for _, place in pulses(ledger.motions.since(0), bench.cell.now)]
     assert [place for _, place in bench.edges(stepper)] == wanted
-    assert bench.position(stepper) == axle.shaft_at(bench.cell.now)
+    assert bench.position(stepper) == ledger.shaft_at(bench.cell.now)
     return len(wanted)
 
 

@@ -106,22 +106,22 @@ def check(bench: Bench, through: Ns) -> int:
     """The steps on the pins are those of the cell, all of them; how many there are."""
     port = bench.ports["b"]
     count = 0
-    for axle in bench.driven.axles:
-        wanted = pulses(axle.motions.since(0), through)
-        edges = bench.edges(axle.name)
-        assert [place for _, place in edges] == [place for _, place in wanted], axle.name
+    for ledger in bench.driven.ledgers:
+        wanted = pulses(ledger.motions.since(0), through)
+        edges = bench.edges(ledger.name)
+        assert [place for _, place in edges] == [place for _, place in wanted], ledger.name
         scale = bench.boards.boards["b"].core.scale
         tick_ns = SECOND / port.board.frequency
-        slips = axle.stepper.slips or axle.stepper.lag
+        slips = ledger.stepper.slips or ledger.stepper.lag
         for (tick, _), (at, _) in zip(edges, wanted, strict=True):
             off = (tick - scale.tick(at)) * tick_ns
             if not slips:
-                assert abs(off) <= ERROR + tick_ns, f"{axle.name}: {off} ns at {at}"
+                assert abs(off) <= ERROR + tick_ns, f"{ledger.name}: {off} ns at {at}"
             assert off >= -(ERROR + tick_ns)
-        state = next(s for s in bench.driven.axes() if (s.unit, s.axis) == (axle.what.unit, axle.what.axis))
-        assert bench.position(axle.name) == state.shaft
-        controller = bench.cell.controller(axle.what.unit)
-        assert controller.status(bench.cell.now, axle.what.axis).pulses == len(edges)
+        state = next(s for s in bench.driven.axes() if (s.unit, s.axis) == (ledger.what.unit, ledger.what.axis))
+        assert bench.position(ledger.name) == state.shaft
+        controller = bench.cell.controller(ledger.what.unit)
+        assert controller.status(bench.cell.now, ledger.what.axis).pulses == len(edges)
         count += len(edges)
     return count
 

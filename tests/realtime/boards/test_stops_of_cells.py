@@ -78,7 +78,7 @@ def compare(case: Case, lead: int, seed: int) -> int:
         spans = wanted.recording.motion("x", wanted.now)
         places = [s.shaft + s.direction * n for s in spans for n in range(s.first, s.last + 1)]
         assert told == places, f"{case.name}: {told[-3:]} and not {places[-3:]}"
-        assert [place for _, place in pulses(bench.driven.axles[0].motions.since(0), bench.cell.now)] == places
+        assert [place for _, place in pulses(bench.driven.ledgers[0].motions.since(0), bench.cell.now)] == places
         status = wanted.controller("x").status(wanted.now)
         assert bench.cell.controller("x").status(bench.cell.now) == status
         heard = "".join(chr(h.char.value & 127) for h in wanted.lines[0].take())

@@ -27,7 +27,7 @@ RESTART: Final = 0.1  # seconds that a unit may take from ^C or ^P until it list
 SCAN: Final = 10.0  # seconds for `&`: 86 names, each with a time-out of the adapter's own
 
 
-class Deaf(NoAnswer):
+class NotListening(NoAnswer):
     """Not even the first character is echoed: a program runs, a command waits, the axis jogs, or nobody is there."""
 
 
@@ -63,7 +63,7 @@ class Handshake(Driver):
     def line(self, text: str, seconds: float, tries: int = TRIES) -> Steps[str]:
         """Enter a line, in so many `tries`; its result, which may take so many `seconds` beside the patience.
 
-        Raises Deaf (nothing was begun), Refused, NoAnswer, BadAnswer.
+        Raises NotListening (nothing was begun), Refused, NoAnswer, BadAnswer.
         """
         raise NotImplementedError
         yield
@@ -157,7 +157,7 @@ class SingleMode(Handshake):
         return result
 
     def enter(self, text: str, tries: int = TRIES) -> Steps[None]:
-        """A line without its CR. Raises Deaf, and BadAnswer when the echo is wrong again and again."""
+        """A line without its CR. Raises NotListening, and BadAnswer when the echo is wrong again and again."""
         echo = b""
         for _ in range(1 if self.running else tries):
             yield Clear()
@@ -173,7 +173,9 @@ class SingleMode(Handshake):
                 yield from self._erase()
         spoken = Spoken(text.encode("latin-1"), echo)
         if not echo:
-            raise Deaf(self.title, "takes no line: a program runs, it jogs, it was reset, or it is not there", spoken)
+            raise NotListening(
+                self.title, "takes no line: a program runs, it jogs, it was reset, or it is not there", spoken
+            )
         raise BadAnswer(self.title, f"did not echo {text!r} as it is; the line was taken back", spoken)
 
     def interrupt(self, character: bytes) -> Steps[None]:
@@ -302,7 +304,7 @@ class PartyLine(Handshake):
         yield Ask(SPOIL + LF, until(b"\n"), self.patience)
         try:
             yield from self.line("", 0.0)
-        except Deaf as error:
+        except NotListening as error:
             what = "is not on the line: is this its name, and is it in party line mode (strap PARTY, or ^P)?"
             raise NoAnswer(self.title, what, error.spoken, "party_line() sends ^P") from None
         return ""
@@ -321,7 +323,7 @@ class PartyLine(Handshake):
         return result
 
     def enter(self, text: str, tries: int = TRIES) -> Steps[None]:
-        """A line without its LF. Raises Deaf, and BadAnswer when the echo is wrong again and again."""
+        """A line without its LF. Raises NotListening, and BadAnswer when the echo is wrong again and again."""
         entered = (self.name + text).encode("latin-1")
         echo = b""
         for _ in range(1 if self.running else tries):
@@ -342,7 +344,7 @@ class PartyLine(Handshake):
                 break
         spoken = Spoken(entered, echo)
         if not echo:
-            raise Deaf(self.title, "takes no line: a program runs, it jogs, or it is not there", spoken)
+            raise NotListening(self.title, "takes no line: a program runs, it jogs, or it is not there", spoken)
         raise BadAnswer(self.title, f"did not echo {entered!r} as it is; the line was spoilt", spoken)
 
     def interrupt(self, character: bytes) -> Steps[None]:
@@ -356,7 +358,7 @@ class PartyLine(Handshake):
         """Whether it says how it moves."""
         try:
             return bool((yield from self.line("^", 0.0)))
-        except Deaf:
+        except NotListening:
             return False
 
     def escape(self) -> Steps[None]:
@@ -434,7 +436,7 @@ class Adapter(Handshake):
                 what = f"is not known to the adapter, which knows {', '.join(known)}; & looks anew, and resets all"
                 raise NoAnswer(self.title, what, error.spoken, "scan() sends &") from None
             yield from self.scan()
-        except Deaf:
+        except NotListening:
             pass  # it is known, and runs a program
         return ""
 
@@ -465,7 +467,7 @@ class Adapter(Handshake):
             what = "is not known to the adapter; & looks for axes, and resets all"
             raise Refused(self.title, what, spoken, "#", "scan() sends &")
         if reply == "?":
-            raise Deaf(self.title, "takes no line: a program runs, it jogs, or it is gone", spoken)
+            raise NotListening(self.title, "takes no line: a program runs, it jogs, or it is gone", spoken)
         if reply.endswith("?"):
             raise NoAnswer(self.title, f"did not echo all of {text!r}", spoken)
         if not reply.startswith(self.name + text):
@@ -499,7 +501,7 @@ class Adapter(Handshake):
         """Whether it says how it moves."""
         try:
             yield from self.line("^", 0.0)
-        except Deaf:
+        except NotListening:
             return False
         return True
 

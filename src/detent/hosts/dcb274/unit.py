@@ -12,8 +12,8 @@ from detent.hosts.dcb274.handshake import (
     TRIES,
     Adapter,
     DaisyChain,
-    Deaf,
     Handshake,
+    NotListening,
     PartyLine,
     SingleMode,
     is_name,
@@ -128,7 +128,7 @@ class Unit(Axis):
         try:
             return (yield from self._way.line(text, seconds, tries))
         except NoAnswer as error:
-            self._connected = isinstance(error, Deaf)
+            self._connected = isinstance(error, NotListening)
             raise
         except GeneratorExit:  # the caller was cancelled
             self._connected, self._broken = False, True

@@ -20,10 +20,10 @@ the wall clock and give bytes, so the same code runs against the fake board in v
 | `events` | what comes back |
 | `plan`, `opening`, `drive` | a cell file's tables to setups; boards opened and ready; what a service needs |
 | `driven` | the cell behind its pins, as the loop serves it; made of the three that follow |
-| `leaving` | what the cell does, on its way out: `channels`, `axle`; who watches (`guard`), what waits (`replies`) |
-| `taking_back` | a stop takes the cell back (`past`), and the boards are told what is different |
+| `outgoing` | what the cell does, on its way out: `channels`, `ledger`; who watches (`guard`), what waits (`replies`) |
+| `rollback` | a stop takes the cell back (`past`), and the boards are told what is different |
 | `stages`, `checking` | what each power stage is told at first; a look at the wiring: inputs live, axes jogged |
-| `mishaps` | faults, emergency stop, recovery; `states` is how all of it stands, for those who look |
+| `failures` | faults, emergency stop, recovery; `states` is how all of it stands, for those who look |
 
 **Time.** `wall` is always the host's monotonic clock in ns. Cell time is the board's time: `Boards.now` gives its
 nanoseconds, from which a `Pace` makes cell time. What the cell does at t leaves the pins at t + lead.

@@ -8,9 +8,9 @@ from detent.outputs.steps import Scale
 from detent.realtime.boards.clock import Clock, nearest
 from detent.realtime.boards.dictionary import BARE, Dictionary, Message, Value
 from detent.realtime.boards.events import Event
-from detent.realtime.boards.fresh import Undo, together
 from detent.realtime.boards.link import Link
 from detent.realtime.boards.setup import BoardSetup
+from detent.realtime.boards.undo import Undo, together
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, SECOND, Ns
 

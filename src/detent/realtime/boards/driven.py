@@ -9,7 +9,7 @@ certain.
 from collections.abc import Sequence
 
 from detent.realtime.boards.events import Stopped
-from detent.realtime.boards.mishaps import Mishaps
+from detent.realtime.boards.failures import Failures
 from detent.realtime.boards.states import AxisState, BoardState, Standing
 from detent.ticks import MS, NEVER, Ns
 from detent.uart import Chars
@@ -18,7 +18,7 @@ SLACK: Ns = 200 * MS  # a host that was stalled hears of a stop so late
 FORGET_EVERY: Ns = 50 * MS
 
 
-class Driven(Mishaps):
+class Driven(Failures):
     """`cell` behind its pins. It is served in the cell's place, and looks after the boards between two wake-ups.
 
     The cell was built with `stores.save` as its store, records, and nothing has happened to it since. The boards are
@@ -74,7 +74,7 @@ class Driven(Mishaps):
             times.append(self._committed + self.boards.batch)
         at = clock + min(times) - wall if times else None
         held = min((line.first for line in self.lines), default=NEVER)
-        tail = min((axle.guard.next for axle in self.axles), default=NEVER)
+        tail = min((ledger.guard.next for ledger in self.ledgers), default=NEVER)
         first = min(held, self._stores.first)
         if min(tail, first) == NEVER:
             return at
@@ -121,20 +121,20 @@ class Driven(Mishaps):
             self._stores.flush(self._horizon())
         if self.cell.now >= self._forgotten + FORGET_EVERY:
             self._forget()
-        moving = any(axle.motion is not None for axle in self.axles)
+        moving = any(ledger.motion is not None for ledger in self.ledgers)
         if moving is not self._was_moving:
             self._was_moving = moving
             self.on_moving(moving)
 
     def _prove(self) -> None:
         """At rest a stepper has been told of all pulses that the cell gave, and of no others: whatever befell it."""
-        for axle in self.axles:
-            resting = axle.motion is None and axle.stepper.resting and axle.awaits is None
-            if axle.standing is Standing.DRIVEN and resting:
-                sent, here = axle.stepper.shaft, axle.shaft_at(self.cell.now)
+        for ledger in self.ledgers:
+            resting = ledger.motion is None and ledger.stepper.resting and ledger.awaits is None
+            if ledger.standing is Standing.DRIVEN and resting:
+                sent, here = ledger.stepper.shaft, ledger.shaft_at(self.cell.now)
                 if sent != here and not self._pending:
-                    self._fault(axle, f"{sent} steps were sent where the cell has {here}")
-                    self._place(axle, sent)
+                    self._fault(ledger, f"{sent} steps were sent where the cell has {here}")
+                    self._place(ledger, sent)
 
     def _forget(self) -> None:
         self._forgotten = self.cell.now
@@ -142,8 +142,8 @@ class Driven(Mishaps):
         if oldest is None:
             return
         counts = iter(oldest.counts)
-        for axle in self.axles:
-            axle.motions.forget(next(counts))
+        for ledger in self.ledgers:
+            ledger.motions.forget(next(counts))
         for out in self._outs.values():
             out.levels.forget(next(counts))
         for _ in self.lines:
@@ -152,9 +152,9 @@ class Driven(Mishaps):
 
     def halt(self) -> None:
         """Whatever moves ends with the steps that have left. Nothing is lived through any more: `close` follows."""
-        moving = [axle for axle in self.axles if axle.motion is not None and axle.standing is Standing.DRIVEN]
-        self.cut_short = frozenset(axle.name for axle in moving)
-        for unit in dict.fromkeys(axle.what.unit for axle in moving):
+        moving = [ledger for ledger in self.ledgers if ledger.motion is not None and ledger.standing is Standing.DRIVEN]
+        self.cut_short = frozenset(ledger.name for ledger in moving)
+        for unit in dict.fromkeys(ledger.what.unit for ledger in moving):
             self.cell.halt(unit)
         self._absorb()
         self.commit()
@@ -166,7 +166,7 @@ class Driven(Mishaps):
             if isinstance(event, Stopped):  # one of the last steps met a switch
                 self._by_stepper[event.stepper].stepper.rewind(event.shaft)
         self.boards.commit(self.cell.now, wall, self._wall)
-        if not all(axle.stepper.over(wall) for axle in self.axles):
+        if not all(ledger.stepper.over(wall) for ledger in self.ledgers):
             return False
         self._over = wall if self._over is None else self._over
         self.boards.inquire(wall)
@@ -182,12 +182,14 @@ class Driven(Mishaps):
     def ended(self) -> list[str]:
         """Where each axis stands, behind `close`: a line each for people."""
         told = []
-        for axle in self.axles:
-            if axle.standing is not Standing.DRIVEN:
-                told.append(f"{axle.name} stands: {axle.why or 'it was not driven yet'}")
+        for ledger in self.ledgers:
+            if ledger.standing is not Standing.DRIVEN:
+                told.append(f"{ledger.name} stands: {ledger.why or 'it was not driven yet'}")
             else:
-                where = f"{axle.name} stands at {axle.stepper.shaft}" + ("" if axle.known else " (not known for sure)")
-                cut = "; it was stopped in mid-move, without a ramp" if axle.name in self.cut_short else ""
+                where = f"{ledger.name} stands at {ledger.stepper.shaft}" + (
+                    "" if ledger.known else " (not known for sure)"
+                )
+                cut = "; it was stopped in mid-move, without a ramp" if ledger.name in self.cut_short else ""
                 told.append(where + cut)
         return told
 
@@ -195,10 +197,10 @@ class Driven(Mishaps):
         """How every driven axis stands."""
         now = self.cell.now
         return [
-            AxisState(axle.what.unit, axle.what.axis, axle.what.board, axle.standing, axle.why, axle.shaft_at(now),
-                      axle.known, axle.motion is not None, self.plan.lead, axle.stepper.lag, axle.stepper.slips,
-                      axle.stepper.slipped, axle.stops, tuple(axle.guard.armed))
-            for axle in self.axles
+            AxisState(ledger.what.unit, ledger.what.axis, ledger.what.board, ledger.standing, ledger.why,
+                      ledger.shaft_at(now), ledger.known, ledger.motion is not None, self.plan.lead, ledger.stepper.lag,
+                      ledger.stepper.slips, ledger.stepper.slipped, ledger.stops, tuple(ledger.guard.armed))
+            for ledger in self.ledgers
         ]  # fmt: skip
 
     def board_states(self) -> list[BoardState]:

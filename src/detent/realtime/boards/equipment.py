@@ -8,13 +8,13 @@ from heapq import heapify, heappop, heapreplace
 from detent.realtime.boards.core import Core
 from detent.realtime.boards.dictionary import Value
 from detent.realtime.boards.drivers import Driver, Wire
-from detent.realtime.boards.fresh import Undo, kept, together
 from detent.realtime.boards.inputs import Inputs
 from detent.realtime.boards.lag import settle
 from detent.realtime.boards.outs import DigitalOut
 from detent.realtime.boards.setup import DriverSetup, InputSetup, SetupProblem
 from detent.realtime.boards.stepper import Stepper
 from detent.realtime.boards.stops import Stop
+from detent.realtime.boards.undo import Undo, kept, together
 from detent.realtime.pace import WallNs
 from detent.ticks import Ns
 

@@ -14,9 +14,9 @@ from detent.pulses import Train
 from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.dictionary import Message, Value
 from detent.realtime.boards.events import CountDiffers, Later, Slipped
-from detent.realtime.boards.fresh import Undo
 from detent.realtime.boards.lag import SETTLED, Lag, Late
 from detent.realtime.boards.setup import StepperSetup
+from detent.realtime.boards.undo import Undo
 from detent.realtime.pace import WallNs
 from detent.ticks import SECOND, Ns
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from detent.controllers.gsc200 import commands as gsc200
-from detent.workbench.errands import Errands
 from detent.workbench.icons import icon
+from detent.workbench.line_scripts import LineScripts
 from detent.workbench.live import Live
 from detent.workbench.messages import LinePicture, Picture
 from detent.workbench.pages import Page, Window
@@ -45,7 +45,7 @@ def build(bench: "Bench", window: Window) -> None:
 
 def offer(site: "FastAPI", bench: "Bench", live: Live) -> None:
     """The calls of this page: rows of a line, scripts."""
-    errands = Errands(bench, live)
+    scripts = LineScripts(bench, live)
 
     async def terminal(line: str, since: int = 0) -> dict[str, object]:
         talk = bench.terminal(line, since)
@@ -54,10 +54,10 @@ def offer(site: "FastAPI", bench: "Bench", live: Live) -> None:
         return {"first": first, "next": talk.next, "cut": talk.cut, "rows": [_row(row) for row in rows]}
 
     async def run_script(line: str, unit: str, text: str, comment: str = ";") -> None:
-        errands.start(line, unit, text, comment)
+        scripts.start(line, unit, text, comment)
 
     async def stop_script(line: str) -> None:
-        errands.stop(line)
+        scripts.stop(line)
 
     for call in (terminal, run_script, stop_script):
         live.offer(call.__name__, call)

@@ -78,7 +78,7 @@ def parse(text: str, comment: str = ";") -> list[Step]:
     return steps
 
 
-class Errands:
+class LineScripts:
     """Runs one script at a time on each line of a bench, and shows in `live` (``script.LINE``) how far it is."""
 
     def __init__(self, bench: "Bench", live: Live) -> None:

@@ -14,7 +14,7 @@ from detent.cell.cell import Cell
 from detent.cell.recording import Batch
 from detent.controllers.device import DriveSet, Powered, Stage, StageSet
 from detent.pins import Level, PinSet
-from detent.realtime.boards.axle import Axle
+from detent.realtime.boards.axis_ledger import AxisLedger
 from detent.realtime.boards.board import State
 from detent.realtime.boards.channels import Channel
 from detent.realtime.boards.clock import Clock
@@ -43,7 +43,7 @@ class Out:
         self.levels: Channel[tuple[Ns, bool]] = Channel()
 
 
-class Leaving:
+class Outgoing:
     """`cell` and its boards. See `driven.Driven`, which is made of this and what stands on it."""
 
     def __init__(
@@ -63,20 +63,20 @@ class Leaving:
         self._outs: dict[tuple[int, str], Out] = {
             (cell.unit(unit), pin): Out(name, cell.unit(unit)) for (unit, pin), name in plan.outs.items()
         }
-        self.axles = [
-            Axle(what, boards.steppers[what.stepper], Guard(boards.stops[what.stepper]), what.shaft)
+        self.ledgers = [
+            AxisLedger(what, boards.steppers[what.stepper], Guard(boards.stops[what.stepper]), what.shaft)
             for what in plan.axes
         ]
         for owner, pin in plan.outs:
             cell.parts[cell.unit(owner)].watch(pin)  # of a winding, or of a pulse, every level is told
-        self._given_at: dict[str, tuple[Axle, Ns]] = {}  # which axis an input has stopped last, and when in the cell
-        self._by_stepper = {axle.name: axle for axle in self.axles}
-        self._of_unit: dict[int, list[Axle]] = {}
-        for axle in self.axles:
-            self._of_unit.setdefault(cell.unit(axle.what.unit), []).append(axle)
-            if axle.what.enable:
-                unit = cell.unit(axle.what.unit)
-                self._outs[unit, axle.what.enable] = Out(axle.what.enable, unit)
+        self._given_at: dict[str, tuple[AxisLedger, Ns]] = {}  # which axis an input stopped last, and when
+        self._by_stepper = {ledger.name: ledger for ledger in self.ledgers}
+        self._of_unit: dict[int, list[AxisLedger]] = {}
+        for ledger in self.ledgers:
+            self._of_unit.setdefault(cell.unit(ledger.what.unit), []).append(ledger)
+            if ledger.what.enable:
+                unit = cell.unit(ledger.what.unit)
+                self._outs[unit, ledger.what.enable] = Out(ledger.what.enable, unit)
         self._input_of = {place: name for name, place in plan.inputs.items()}
         self._raw: dict[str, Level] = {}  # as the boards last said
         self._given: dict[str, Level] = {}  # as the cell was told
@@ -109,12 +109,12 @@ class Leaving:
         """The cell's present is the boards' present; `inputs` are what the cell was built with."""
         self._raw, self._given = dict(inputs), dict(inputs)
         self.align(pace)
-        for axle in self.axles:
-            axle.stepper.adopt(axle.shaft_at(self.cell.now))
-            axle.standing = Standing.DRIVEN
-            if axle.what.stage is not None:
-                self._stages[axle.name] = axle.what.stage
-                self._command(axle)
+        for ledger in self.ledgers:
+            ledger.stepper.adopt(ledger.shaft_at(self.cell.now))
+            ledger.standing = Standing.DRIVEN
+            if ledger.what.stage is not None:
+                self._stages[ledger.name] = ledger.what.stage
+                self._command(ledger)
         for unit, pin in self._outs:
             self._level(unit, pin, False, self.cell.now)  # until the recording tells better
         self._absorb()
@@ -154,12 +154,12 @@ class Leaving:
 
     @property
     def _guarded(self) -> bool:
-        return any(axle.guard.armed for axle in self.axles)
+        return any(ledger.guard.armed for ledger in self.ledgers)
 
     @property
     def lag(self) -> Ns:
         """How much later than the lead the pins are at present: the latest axis."""
-        return max((axle.stepper.behind(self.cell.now) for axle in self.axles), default=0)
+        return max((ledger.stepper.behind(self.cell.now) for ledger in self.ledgers), default=0)
 
     @property
     def _behind(self) -> Ns:
@@ -172,7 +172,7 @@ class Leaving:
 
     def _certain(self) -> Ns:
         """What the cell did up to then is certain: no stop can be earlier that is not known."""
-        left = min((self._left(axle) for axle in self.axles), default=self.cell.now - self.plan.lead)
+        left = min((self._left(ledger) for ledger in self.ledgers), default=self.cell.now - self.plan.lead)
         return left - max(CERTAIN, self._unheard())
 
     def _unheard(self) -> Ns:
@@ -194,7 +194,7 @@ class Leaving:
 
     def _counts(self) -> tuple[int, ...]:
         return (
-            *(axle.motions.count for axle in self.axles),
+            *(ledger.motions.count for ledger in self.ledgers),
             *(out.levels.count for out in self._outs.values()),
             *(line.count for line in self.lines),
             self._stores.count,
@@ -209,7 +209,9 @@ class Leaving:
             return
         self._pending = True
         at_fault = {
-            axle.what.unit for axle in self.axles if axle.standing is Standing.FAULT and axle.motion is not None
+            ledger.what.unit
+            for ledger in self.ledgers
+            if ledger.standing is Standing.FAULT and ledger.motion is not None
         }
         for unit in at_fault:
             self.cell.halt(unit)
@@ -225,15 +227,15 @@ class Leaving:
         """Note what the units did, and tell the boards. Whether anything that concerns them is among it."""
         found = False
         for unit, entries in batches:
-            axles = self._of_unit.get(unit)
+            ledgers = self._of_unit.get(unit)
             for entry in entries:
                 if isinstance(entry, (MotionStarted, MotionCut, MotionEnded)):
-                    for axle in axles or ():
-                        if axle.what.axis == entry.axis:
-                            axle.take(entry)
+                    for ledger in ledgers or ():
+                        if ledger.what.axis == entry.axis:
+                            ledger.take(entry)
                             found = True
-                            if tell and axle.standing is not Standing.FAULT:
-                                axle.stepper.tell(entry)
+                            if tell and ledger.standing is not Standing.FAULT:
+                                ledger.stepper.tell(entry)
                 elif isinstance(entry, PinSet):
                     if (unit, entry.pin) in self._outs:
                         self._level(unit, entry.pin, bool(entry.level), entry.at, tell=tell)
@@ -243,13 +245,13 @@ class Leaving:
                     found = True
                 elif isinstance(entry, (StageSet, DriveSet)):
                     self._staged(unit, entry)
-            found = found or axles is not None
+            found = found or ledgers is not None
         return found
 
     def _powered(self, unit: int, entry: Powered, *, tell: bool) -> None:
-        for axle in self._of_unit.get(unit, ()):
-            if axle.what.enable:
-                self._level(unit, axle.what.enable, entry.on, entry.at, tell=tell)
+        for ledger in self._of_unit.get(unit, ()):
+            if ledger.what.enable:
+                self._level(unit, ledger.what.enable, entry.on, entry.at, tell=tell)
         if not entry.on:
             controller = self.cell.parts[unit]
             rests = {pin.name: pin for pin in controller.pins}
@@ -271,65 +273,67 @@ class Leaving:
             self._set(out, level, at)
 
     def _set(self, out: Out, level: bool, at: Ns) -> None:
-        axles = self._of_unit.get(out.unit, ())
-        if any(axle.what.enable == out.name and axle.standing is Standing.FAULT for axle in axles):
+        ledgers = self._of_unit.get(out.unit, ())
+        if any(ledger.what.enable == out.name and ledger.standing is Standing.FAULT for ledger in ledgers):
             return
-        self.boards.outs[out.name].set(level, at, max((axle.stepper.lag for axle in axles), default=0))
+        self.boards.outs[out.name].set(level, at, max((ledger.stepper.lag for ledger in ledgers), default=0))
         self._pending = True
 
     def _staged(self, unit: int, entry: StageSet | DriveSet) -> None:
         stage = entry.stage if isinstance(entry, StageSet) else getattr(entry.drive, "stage", None)
-        for axle in self._of_unit.get(unit, ()):
-            if axle.what.axis == entry.axis and stage is not None and self._stages.get(axle.name) != stage:
-                self._stages[axle.name] = stage
-                self._command(axle)
+        for ledger in self._of_unit.get(unit, ()):
+            if ledger.what.axis == entry.axis and stage is not None and self._stages.get(ledger.name) != stage:
+                self._stages[ledger.name] = stage
+                self._command(ledger)
 
-    def _command(self, axle: Axle) -> None:
+    def _command(self, ledger: AxisLedger) -> None:
         """Tell the driver of an axis its current."""
-        stage = self._stages.get(axle.name)
+        stage = self._stages.get(ledger.name)
         if stage is None:
             return
-        if axle.what.driver:
-            driver = self.boards.drivers[axle.what.driver]
+        if ledger.what.driver:
+            driver = self.boards.drivers[ledger.what.driver]
             asked, most = max(stage.run, stage.hold), driver.setup.amperes
-            if stage.chops and most is not None and asked > most and axle.limited != asked:
-                axle.limited = asked
-                what = f"{axle.what.unit} commands {asked:g} A a phase"
-                self._say(Weight.NOTE, f"{axle.name}: {what}, and its driver gives {most:g} A (amperes)")
+            if stage.chops and most is not None and asked > most and ledger.limited != asked:
+                ledger.limited = asked
+                what = f"{ledger.what.unit} commands {asked:g} A a phase"
+                self._say(Weight.NOTE, f"{ledger.name}: {what}, and its driver gives {most:g} A (amperes)")
             try:
                 driver.command(stage)
             except SetupProblem as problem:
-                self._fault(axle, str(self.plan.problem(problem)))
+                self._fault(ledger, str(self.plan.problem(problem)))
 
     def _currents(self) -> None:
         """Tell plain drivers whether half of the current is enough: from before the first step to behind the last."""
         now = self.cell.now
-        for axle in self.axles:
-            if not axle.what.half or axle.standing is Standing.FAULT:
+        for ledger in self.ledgers:
+            if not ledger.what.half or ledger.standing is Standing.FAULT:
                 continue
-            stage = self._stages.get(axle.name)
-            over = axle.rested is not None and now >= axle.rested + self.plan.lead + axle.stepper.behind(now)
+            stage = self._stages.get(ledger.name)
+            over = ledger.rested is not None and now >= ledger.rested + self.plan.lead + ledger.stepper.behind(now)
             if stage is None:
                 half = over
             else:
-                holds = over and stage.settling > 0 and axle.rested is not None and now >= axle.rested + stage.settling
+                holds = (
+                    over and stage.settling > 0 and ledger.rested is not None and now >= ledger.rested + stage.settling
+                )
                 full = max(stage.run, stage.hold) if stage.chops else 1.0
                 half = (stage.hold if holds else stage.run) <= full / 2
-            if self._halved.get(axle.name) is not half:
-                self._halved[axle.name] = half
-                self.boards.outs[axle.what.half].now(half)
+            if self._halved.get(ledger.name) is not half:
+                self._halved[ledger.name] = half
+                self.boards.outs[ledger.what.half].now(half)
                 self._pending = True
 
     def _arm(self) -> None:
         """Let the firmware watch the inputs that would cut what is under way."""
         now, kept = self.cell.now, False
-        for axle in self.axles:
-            if axle.standing is not Standing.DRIVEN:
+        for ledger in self.ledgers:
+            if ledger.standing is not Standing.DRIVEN:
                 continue
-            motion, inputs = axle.motion, self._cuts(axle)
-            if inputs != axle.guard.wanted:
-                at = motion.at if motion is not None and not axle.guard.armed else now
-                axle.guard.want(inputs, at, now)
+            motion, inputs = ledger.motion, self._cuts(ledger)
+            if inputs != ledger.guard.wanted:
+                at = motion.at if motion is not None and not ledger.guard.armed else now
+                ledger.guard.want(inputs, at, now)
                 self._pending = True
                 kept = kept or bool(inputs)
         if kept or (self._guarded and self._worn(now)):
@@ -343,26 +347,26 @@ class Leaving:
         away = now - self.past.moments[-1].now
         return away >= (KEEP if self._instants >= BUSY else KEEP_QUIET)
 
-    def _cuts(self, axle: Axle) -> dict[str, Level]:
+    def _cuts(self, ledger: AxisLedger) -> dict[str, Level]:
         """The inputs of its board that would cut what an axis does now."""
         inputs: dict[str, Level] = {}
-        if axle.motion is not None:
-            for stop in self.cell.controller(axle.what.unit).cuts(self.cell.now, axle.what.axis):
-                name = self._input_of.get((axle.what.unit, stop.pin))
-                if name is not None and self.plan.board_of[name] == axle.what.board:
+        if ledger.motion is not None:
+            for stop in self.cell.controller(ledger.what.unit).cuts(self.cell.now, ledger.what.axis):
+                name = self._input_of.get((ledger.what.unit, stop.pin))
+                if name is not None and self.plan.board_of[name] == ledger.what.board:
                     inputs[name] = stop.level
         return inputs
 
-    def _left(self, axle: Axle) -> Ns:
+    def _left(self, ledger: AxisLedger) -> Ns:
         """The cell time up to which every pulse of an axis has left the pins: sent, and a lead and its lag ago."""
-        due = axle.stepper.next_pulse()
+        due = ledger.stepper.next_pulse()
         sent = self.cell.now if due is None else min(due - 1, self.cell.now)
-        return sent - self.plan.lead - axle.stepper.behind(self.cell.now)
+        return sent - self.plan.lead - ledger.stepper.behind(self.cell.now)
 
     def _refresh(self) -> None:
-        for axle in self.axles:
-            if axle.guard.next < self._left(axle):
-                axle.guard.refresh(self._left(axle), self.cell.now)
+        for ledger in self.ledgers:
+            if ledger.guard.next < self._left(ledger):
+                ledger.guard.refresh(self._left(ledger), self.cell.now)
         self._arm()
 
     def _give(self, name: str, level: Level, board_ns: Ns) -> None:
@@ -376,11 +380,11 @@ class Leaving:
     def _say(self, weight: Weight, text: str) -> None:
         self._tell(News(self.cell.now, weight, text))
 
-    def _fault(self, axle: Axle, why: str, *, known: bool = True) -> None:
+    def _fault(self, ledger: AxisLedger, why: str, *, known: bool = True) -> None:
         """An axis does not move any more."""
         raise NotImplementedError
 
-    def _place(self, axle: Axle, shaft: int) -> None:
+    def _place(self, ledger: AxisLedger, shaft: int) -> None:
         """The motor of an axis stands at `shaft`."""
         raise NotImplementedError
 

@@ -14,7 +14,7 @@ from detent.ticks import NEVER, Ns
 Motion: TypeAlias = MotionStarted | MotionCut | MotionEnded
 
 
-class Axle:
+class AxisLedger:
     """A driven axis. Its motions are a channel: they can be taken back."""
 
     def __init__(self, what: DrivenAxis, stepper: Stepper, guard: Guard, shaft: int) -> None:

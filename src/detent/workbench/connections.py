@@ -11,10 +11,10 @@ MOST: Final = 256  # connections at once that are no open windows; one more take
 _Protocol: Any = AutoHTTPProtocol
 
 
-class Hurried(_Protocol):  # type: ignore[misc]
+class LimitedConnection(_Protocol):  # type: ignore[misc]
     """A connection of uvicorn with patience. A WebSocket, which has passed the guard, is left alone."""
 
-    open: ClassVar["dict[Hurried, None]"] = {}  # of this process, the oldest first
+    open: ClassVar["dict[LimitedConnection, None]"] = {}  # of this process, the oldest first
 
     def connection_made(self, transport: asyncio.Transport) -> None:
         """A client has come."""

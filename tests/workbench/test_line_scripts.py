@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from detent.ticks import MS, SECOND
-from detent.workbench.errands import Answered, Command, Errands, Pause, parse
+from detent.workbench.line_scripts import Answered, Command, LineScripts, Pause, parse
 from detent.workbench.live import Live
 
 
@@ -53,15 +53,15 @@ class Bench:
         return SimpleNamespace(rows=[SimpleNamespace(whole=True, sender="bar")] * self.answers)
 
 
-def run(text: str, then: Callable[[Errands], None] = lambda errands: None) -> tuple[Bench, Live]:
+def run(text: str, then: Callable[[LineScripts], None] = lambda scripts: None) -> tuple[Bench, Live]:
     """A script run to its end; `then` is called once it has begun."""
     bench, live = Bench(), Live()
 
     async def whole() -> None:
-        errands = Errands(bench, live)  # type: ignore[arg-type]
-        errands.start("bar", "bar", text)
+        scripts = LineScripts(bench, live)  # type: ignore[arg-type]
+        scripts.start("bar", "bar", text)
         await asyncio.sleep(0)
-        then(errands)
+        then(scripts)
         while live.get("script.bar")["running"]:  # type: ignore[index,call-overload]
             await asyncio.sleep(0)
 
@@ -97,11 +97,11 @@ def test_a_command_is_repeated_at_an_interval_until_it_is_stopped() -> None:
     bench, live = Bench(), Live()
 
     async def whole() -> None:
-        errands = Errands(bench, live)  # type: ignore[arg-type]
-        errands.start("bar", "bar", "V1\n@ 1\n@ again")
+        scripts = LineScripts(bench, live)  # type: ignore[arg-type]
+        scripts.start("bar", "bar", "V1\n@ 1\n@ again")
         while len(bench.sent) < 3:
             await asyncio.sleep(0)
-        errands.stop("bar")
+        scripts.stop("bar")
 
     asyncio.run(whole())
     assert bench.sent[:3] == [(0, "V1"), (5 * SECOND // 4, "V1"), (9 * SECOND // 4, "V1")]
@@ -110,16 +110,16 @@ def test_a_command_is_repeated_at_an_interval_until_it_is_stopped() -> None:
 
 
 def test_a_script_that_is_stopped_sends_no_more() -> None:
-    bench, live = run("+1\n@ 1000\n+2\n", lambda errands: errands.stop("bar"))
+    bench, live = run("+1\n@ 1000\n+2\n", lambda scripts: scripts.stop("bar"))
     assert [text for _, text in bench.sent] == ["+1"]
     assert live.get("script.bar") == {"running": False, "line": 0, "told": "stopped"}
 
 
 def test_a_script_needs_something_to_send_and_a_unit_on_the_line() -> None:
-    errands = Errands(Bench(), Live())  # type: ignore[arg-type]
+    scripts = LineScripts(Bench(), Live())  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="nothing to send"):
-        errands.start("bar", "bar", "; nothing\n")
+        scripts.start("bar", "bar", "; nothing\n")
     with pytest.raises(ValueError, match="drill is not on line bar"):
-        errands.start("bar", "drill", "+1")
+        scripts.start("bar", "drill", "+1")
     with pytest.raises(KeyError):
-        errands.start("foo", "bar", "+1")
+        scripts.start("foo", "bar", "+1")

@@ -9,12 +9,12 @@ from detent.cell.recording import Batch
 from detent.controllers.device import Powered
 from detent.lines.line import Heard
 from detent.pins import Level, PinSet
-from detent.realtime.boards.axle import Axle, Motion
+from detent.realtime.boards.axis_ledger import AxisLedger, Motion
 from detent.realtime.boards.channels import alike
 from detent.realtime.boards.events import (
     Stopped,
 )
-from detent.realtime.boards.leaving import Leaving, Out
+from detent.realtime.boards.outgoing import Out, Outgoing
 from detent.realtime.boards.past import Moment
 from detent.realtime.boards.states import Standing, Weight
 from detent.ticks import MS, Ns
@@ -23,39 +23,39 @@ AWAITED: Ns = 100 * MS  # reports of a trigger come every 25 ms
 MOST_SINGLES = 8  # pulses in a row that an input stops one by one
 
 
-class TakingBack(Leaving):
+class Rollback(Outgoing):
     """What is done when the firmware has stopped an axis."""
 
     def _stopped(self, event: Stopped) -> None:
         """The firmware has stopped an axis: the cell is taken back to there."""
         began = self._wall()
-        axle = self._by_stepper[event.stepper]
-        other, given = self._given_at.get(event.input, (axle, event.at))
-        if other is not axle and event.at < given and axle.motion is None:
+        ledger = self._by_stepper[event.stepper]
+        other, given = self._given_at.get(event.input, (ledger, event.at))
+        if other is not ledger and event.at < given and ledger.motion is None:
             self._stopped_too(
-                axle, event
+                ledger, event
             )  # it is later than the other, and the input has stopped it in the cell already
             return
-        axle.guard.fired()
-        axle.stops += 1
+        ledger.guard.fired()
+        ledger.stops += 1
         self.rewinds += 1
         unit, pin = self.plan.inputs[event.input]
-        at = min(axle.instant_of(event.shaft, event.at), self.cell.now)
+        at = min(ledger.instant_of(event.shaft, event.at), self.cell.now)
         if self.past.moments:
             at = max(at, self.past.moments[0].now)
-        if not self.past.reaches(at) or axle.place_at(at) != event.shaft:
-            self._fault(axle, f"{event.input} has stopped it at {event.shaft}, and nobody knows when that was")
-            self._place(axle, event.shaft)
+        if not self.past.reaches(at) or ledger.place_at(at) != event.shaft:
+            self._fault(ledger, f"{event.input} has stopped it at {event.shaft}, and nobody knows when that was")
+            self._place(ledger, event.shaft)
             return
-        if self._gates(axle, event):
+        if self._gates(ledger, event):
             what = f"{event.input} lets every single pulse through, and on real pins each takes some milliseconds"
-            self._fault(axle, f"{what}: leave the input out, and wire the detector to the driver")
-            self._place(axle, event.shaft)
+            self._fault(ledger, f"{what}: leave the input out, and wire the detector to the driver")
+            self._place(ledger, event.shaft)
             return
         # what the switches of this axis are at was so at the stop already: it stands, and reports take their time
-        switches = {(unit, other) for other in self.cell.controller(unit).switches(axle.what.axis)}
+        switches = {(unit, other) for other in self.cell.controller(unit).switches(ledger.what.axis)}
         if (unit, pin) in switches:
-            axle.lost, axle.known = False, True  # as far as a switch tells it
+            ledger.lost, ledger.known = False, True  # as far as a switch tells it
         others = {
             name: int(found)
             for name, found in event.levels.items()
@@ -69,12 +69,12 @@ class TakingBack(Leaving):
             if place in fresh or self._given[name] != found:
                 actions.append(SetPin(*place, found))
                 self._raw[name] = self._given[name] = found
-        self._given_at[event.input] = axle, at
+        self._given_at[event.input] = ledger, at
         level = int(event.level)
         actions.append(SetPin(unit, pin, level))
         drop = {(when, set_) for when, set_, _ in self._reports if when > at and (set_.unit, set_.pin) in late}
         self._reports = deque((item for item in self._reports if item[:2] not in drop), maxlen=256)
-        self._take_back(axle, at, actions, lambda action: (action.at, action.what) in drop, event)
+        self._take_back(ledger, at, actions, lambda action: (action.at, action.what) in drop, event)
         self._raw[event.input], self._given[event.input] = int(event.present), level
         if int(event.present) != level:
             self._give(event.input, int(event.present), self.clock())
@@ -89,16 +89,21 @@ class TakingBack(Leaving):
             if self._given[name] != int(found):
                 self._give(name, int(found), self.clock())
 
-    def _gates(self, axle: Axle, event: Stopped) -> bool:
+    def _gates(self, ledger: AxisLedger, event: Stopped) -> bool:
         """Whether an input has stopped every single pulse of late."""
-        last = axle.held
+        last = ledger.held
         alone = last is not None and last[:2] == (event.input, event.level) and abs(event.shaft - last[2]) <= 1
-        axle.held = event.input, event.level, event.shaft
-        axle.singles = axle.singles + 1 if alone else 0
-        return axle.singles >= MOST_SINGLES
+        ledger.held = event.input, event.level, event.shaft
+        ledger.singles = ledger.singles + 1 if alone else 0
+        return ledger.singles >= MOST_SINGLES
 
     def _take_back(
-        self, stopped: Axle, at: Ns, actions: Sequence[Action], drop: Callable[[TimedAction], bool], event: Stopped
+        self,
+        stopped: AxisLedger,
+        at: Ns,
+        actions: Sequence[Action],
+        drop: Callable[[TimedAction], bool],
+        event: Stopped,
     ) -> None:
         """The cell lives on from `at`, where `actions` are done; tell the boards only what is different."""
         self.on_taken_back(at)
@@ -113,19 +118,21 @@ class TakingBack(Leaving):
             """The cell is at `at` again: what it did up to there was told before."""
             batches = self._batches()
             ahead = list(moment.counts)
-            for place, axle in enumerate(self.axles):
+            for place, ledger in enumerate(self.ledgers):
                 ahead[place] += sum(
-                    isinstance(entry, (MotionStarted, MotionCut, MotionEnded)) and entry.axis == axle.what.axis
+                    isinstance(entry, (MotionStarted, MotionCut, MotionEnded)) and entry.axis == ledger.what.axis
                     for unit, entries in batches
-                    if axle in self._of_unit.get(unit, ())
+                    if ledger in self._of_unit.get(unit, ())
                     for entry in entries
                 )
-            counts.extend(ahead[: len(self.axles)])
-            for axle, count in zip(self.axles, counts, strict=True):
-                before = axle.motions.before(count)
-                here = axle.place_at(at)
-                motions[axle.name] = axle.take_back(count, _rests(before, axle.shaft_at(at) if here is None else here))
-            place = len(self.axles)
+            counts.extend(ahead[: len(self.ledgers)])
+            for ledger, count in zip(self.ledgers, counts, strict=True):
+                before = ledger.motions.before(count)
+                here = ledger.place_at(at)
+                motions[ledger.name] = ledger.take_back(
+                    count, _rests(before, ledger.shaft_at(at) if here is None else here)
+                )
+            place = len(self.ledgers)
             for out in self._outs.values():
                 count = moment.counts[place] + self._levels_in(batches, out)
                 levels[out.name], places[out.name] = out.levels.cut(count), count
@@ -148,13 +155,13 @@ class TakingBack(Leaving):
         self.past.back(at, actions, drop, arrived, lived)
         lived()
         heard: list[list[Heard]] = [self.cell.lines[number].take() for number in range(len(self.lines))]
-        for line, count, new in zip(self.lines, counts[len(self.axles) :], heard, strict=True):
+        for line, count, new in zip(self.lines, counts[len(self.ledgers) :], heard, strict=True):
             for wrong, right in line.rewind(count, new):
                 self.escaped += 1
                 instead = "" if right is None else f"; it would be {right.char.value:#04x}"
                 what = f"a host heard {wrong.char.value:#04x} of {wrong.at / 1e9:.4f} s before a stop took it back"
                 self._say(Weight.WARNING, what + instead)
-        self._tell_axles(stopped, event, motions, counts)
+        self._tell_ledgers(stopped, event, motions, counts)
         if stopped.standing is Standing.DRIVEN:  # before any pulse leaves; those that came and went meanwhile, too
             for when, inputs in met:
                 stopped.guard.want(inputs, when, when)
@@ -174,35 +181,37 @@ class TakingBack(Leaving):
                 if isinstance(entry, PinSet):
                     count += self._outs.get((unit, entry.pin)) is out
                 elif isinstance(entry, Powered):
-                    enables = any(axle.what.enable == out.name for axle in self._of_unit.get(unit, ()))
+                    enables = any(ledger.what.enable == out.name for ledger in self._of_unit.get(unit, ()))
                     count += enables or not entry.on
         return count
 
-    def _tell_axles(self, stopped: Axle, event: Stopped, old: dict[str, list[Motion]], counts: Sequence[int]) -> None:
+    def _tell_ledgers(
+        self, stopped: AxisLedger, event: Stopped, old: dict[str, list[Motion]], counts: Sequence[int]
+    ) -> None:
         now = self.cell.now
-        for axle, count in zip(self.axles, counts, strict=False):
-            new = axle.motions.since(count)
-            if axle.standing is not Standing.DRIVEN:
+        for ledger, count in zip(self.ledgers, counts, strict=False):
+            new = ledger.motions.since(count)
+            if ledger.standing is not Standing.DRIVEN:
                 continue
-            if axle is not stopped:
-                if new != old[axle.name] and axle.guard.armed.get(event.input) == int(event.level):
-                    axle.awaits = event.input, self._wall()
-                    axle.stepper.halt()
+            if ledger is not stopped:
+                if new != old[ledger.name] and ledger.guard.armed.get(event.input) == int(event.level):
+                    ledger.awaits = event.input, self._wall()
+                    ledger.stepper.halt()
                     continue
-                lost = axle.tell_difference(old[axle.name], new, now)
+                lost = ledger.tell_difference(old[ledger.name], new, now)
                 if lost:
-                    axle.end_told(now, old[axle.name])
-                    self._contradicted(axle, stopped, lost)
+                    ledger.end_told(now, old[ledger.name])
+                    self._contradicted(ledger, stopped, lost)
                 continue
-            axle.stepper.rewind(event.shaft)
-            force = axle.motion_after(count)
+            ledger.stepper.rewind(event.shaft)
+            force = ledger.motion_after(count)
             if force is not None:
-                axle.stepper.tell(force)
+                ledger.stepper.tell(force)
             for motion in new:
-                axle.stepper.tell(motion)
+                ledger.stepper.tell(motion)
 
     def _tell_out(
-        self, out: Out, old: list[tuple[Ns, bool]], new: list[tuple[Ns, bool]], at: Ns, stopped: Axle
+        self, out: Out, old: list[tuple[Ns, bool]], new: list[tuple[Ns, bool]], at: Ns, stopped: AxisLedger
     ) -> None:
         mine = out.unit == self.cell.unit(stopped.what.unit)
         same = alike(old, new)
@@ -214,47 +223,47 @@ class TakingBack(Leaving):
         for when, level in new:
             self._set(out, level, when)
 
-    def _stopped_too(self, axle: Axle, event: Stopped) -> None:
+    def _stopped_too(self, ledger: AxisLedger, event: Stopped) -> None:
         """What stopped another axis stopped this one at the same instant: the cell has been there already.
 
         The two are looked at one after the other, and one may be later than the other: some steps may be between.
         """
-        axle.awaits = None
-        axle.guard.fired()
-        axle.stops += 1
-        if axle.motion is not None:
-            self._fault(axle, f"{event.input} has stopped it, and it moves on in the cell")
-        if event.shaft != axle.shaft_at(self.cell.now):
-            self._place(axle, event.shaft)
+        ledger.awaits = None
+        ledger.guard.fired()
+        ledger.stops += 1
+        if ledger.motion is not None:
+            self._fault(ledger, f"{event.input} has stopped it, and it moves on in the cell")
+        if event.shaft != ledger.shaft_at(self.cell.now):
+            self._place(ledger, event.shaft)
             self.past.clear()  # nobody goes back to before that
             self.past.keep()
-        axle.stepper.rewind(event.shaft)
+        ledger.stepper.rewind(event.shaft)
         self._arm()
         self._pending = True
 
     def _not_stopped(self) -> None:
         """An axis that should have been stopped as another was, and was not, has made what it was sent."""
-        for axle in self.axles:
-            if axle.awaits is None or axle.standing is not Standing.DRIVEN:
+        for ledger in self.ledgers:
+            if ledger.awaits is None or ledger.standing is not Standing.DRIVEN:
                 continue
-            name, since = axle.awaits
-            if self._wall() - since > self.plan.lead + axle.stepper.behind(self.cell.now) + AWAITED:
-                axle.awaits = None
-                self._fault(axle, f"{name} has not stopped it as it stopped another axis")
-                self._place(axle, axle.stepper.shaft)
+            name, since = ledger.awaits
+            if self._wall() - since > self.plan.lead + ledger.stepper.behind(self.cell.now) + AWAITED:
+                ledger.awaits = None
+                self._fault(ledger, f"{name} has not stopped it as it stopped another axis")
+                self._place(ledger, ledger.stepper.shaft)
 
-    def _contradicted(self, axle: Axle, stopped: Axle, lost: int) -> None:
+    def _contradicted(self, ledger: AxisLedger, stopped: AxisLedger, lost: int) -> None:
         """Pulses left that the cell did not give after all: it is told where the motor is, and the axis stands."""
-        if axle.what.unit == stopped.what.unit and axle.motion is None:  # it is ahead of the other, which slipped
+        if ledger.what.unit == stopped.what.unit and ledger.motion is None:  # it is ahead of the other, which slipped
             what = f"{lost} steps that had left when a late stop of {stopped.name} was told are counted all the same"
-            self._say(Weight.WARNING, f"{axle.name}: {what}")
-            self._place(axle, axle.stepper.shaft)
+            self._say(Weight.WARNING, f"{ledger.name}: {what}")
+            self._place(ledger, ledger.stepper.shaft)
             self.past.clear()
             self.past.keep()
             return
         what = f"{lost} steps left the pins though a stop of {stopped.name} took them back"
-        self._fault(axle, f"{what}: wires of the cell make it follow too closely; the counter says where it stands")
-        self._place(axle, axle.stepper.shaft)
+        self._fault(ledger, f"{what}: wires of the cell make it follow too closely; the counter says where it stands")
+        self._place(ledger, ledger.stepper.shaft)
 
 
 def _rests(before: Sequence[Motion], shaft: int) -> int:

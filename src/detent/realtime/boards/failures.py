@@ -1,6 +1,6 @@
 """What comes from the boards, and what becomes of axes when something fails: they stand until somebody says recover."""
 
-from detent.realtime.boards.axle import Axle
+from detent.realtime.boards.axis_ledger import AxisLedger
 from detent.realtime.boards.events import (
     CountDiffers,
     DriverFault,
@@ -16,13 +16,13 @@ from detent.realtime.boards.events import (
     Slipped,
     Stopped,
 )
+from detent.realtime.boards.rollback import Rollback
 from detent.realtime.boards.setup import SetupProblem
 from detent.realtime.boards.states import Standing, Weight
-from detent.realtime.boards.taking_back import TakingBack
 from detent.ticks import NEVER, Ns, show_duration
 
 
-class Mishaps(TakingBack):
+class Failures(Rollback):
     """An axis at fault is halted in the cell too, so that no counter says what no motor did."""
 
     def _happened(self, event: Event) -> None:
@@ -32,17 +32,17 @@ class Mishaps(TakingBack):
                 if int(level) != self._given.get(name):
                     self._give(name, int(level), at + self._shift)
             case Stopped():
-                axle = self._by_stepper[event.stepper]
-                if axle.standing is Standing.DRIVEN and axle.awaits is not None:
-                    self._stopped_too(axle, event)
-                elif axle.standing is Standing.DRIVEN and event.input in self.plan.inputs:
+                ledger = self._by_stepper[event.stepper]
+                if ledger.standing is Standing.DRIVEN and ledger.awaits is not None:
+                    self._stopped_too(ledger, event)
+                elif ledger.standing is Standing.DRIVEN and event.input in self.plan.inputs:
                     self._stopped(event)
-                elif axle.standing is Standing.DRIVEN:
-                    self._fault(axle, "the board has stopped it, and does not say why")
-                    self._place(axle, event.shaft)
+                elif ledger.standing is Standing.DRIVEN:
+                    self._fault(ledger, "the board has stopped it, and does not say why")
+                    self._place(ledger, event.shaft)
                 else:  # steps that had left when it failed have met a switch
-                    axle.guard.fired()
-                    self._place(axle, event.shaft)
+                    ledger.guard.fired()
+                    self._place(ledger, event.shaft)
                 self._heard(event.levels)
             case Later(_, stepper, at, _):
                 self._later(self._by_stepper[stepper], at)
@@ -54,10 +54,10 @@ class Mishaps(TakingBack):
                 what = f"{who} slipped by {show_duration(by)}: the computer was late; no step is lost"
                 self._say(Weight.WARNING, f"{what} ({slips} {'slip' if slips == 1 else 'slips'} so far)")
             case CountDiffers(_, stepper, shaft, counted):
-                axle = self._by_stepper[stepper]
-                if axle.standing is Standing.DRIVEN:
-                    self._fault(axle, f"the board has counted {counted} where the cell has {shaft}")
-                    self._place(axle, counted)
+                ledger = self._by_stepper[stepper]
+                if ledger.standing is Standing.DRIVEN:
+                    self._fault(ledger, f"the board has counted {counted} where the cell has {shaft}")
+                    self._place(ledger, counted)
             case ShutDown(board, reason):
                 self._board_failed(board, f"board {board} has shut down: {reason}", None)
             case Lost(board, reason):
@@ -65,9 +65,9 @@ class Mishaps(TakingBack):
             case Recovered():
                 self._recovered(event)
             case DriverFault(_, driver, reason):
-                for axle in self.axles:
-                    if axle.what.driver == driver and axle.standing is not Standing.FAULT:
-                        self._fault(axle, f"its driver: {reason}")
+                for ledger in self.ledgers:
+                    if ledger.what.driver == driver and ledger.standing is not Standing.FAULT:
+                        self._fault(ledger, f"its driver: {reason}")
             case DriverSet(_, driver, what):
                 self._say(Weight.NOTE, f"{driver}: {what}")
             case Refusal(board, item, key, text):
@@ -76,9 +76,9 @@ class Mishaps(TakingBack):
             case Ready():
                 pass  # it was, before anything began
 
-    def _later(self, axle: Axle, at: Ns) -> None:
+    def _later(self, ledger: AxisLedger, at: Ns) -> None:
         """Pulses from `at` on come later: so do the outputs of the unit."""
-        unit = self.cell.unit(axle.what.unit)
+        unit = self.cell.unit(ledger.what.unit)
         for out in self._outs.values():
             after = [item for item in out.levels.before(out.levels.count) if item[0] >= at]
             if out.unit == unit and after:
@@ -87,56 +87,56 @@ class Mishaps(TakingBack):
                     self._set(out, level, when)
 
     def _board_failed(self, board: str, why: str, position: str | None) -> None:
-        for axle in self.axles:
-            if axle.what.board == board and axle.standing is not Standing.FAULT:
-                self._fault(axle, why, known=False)
+        for ledger in self.ledgers:
+            if ledger.what.board == board and ledger.standing is not Standing.FAULT:
+                self._fault(ledger, why, known=False)
                 if position is not None:
-                    self._place(axle, axle.stepper.shaft)
+                    self._place(ledger, ledger.stepper.shaft)
 
-    def _fault(self, axle: Axle, why: str, *, known: bool = True) -> None:
+    def _fault(self, ledger: AxisLedger, why: str, *, known: bool = True) -> None:
         """An axis does not move any more: its unit is halted, and told so whenever it tries."""
-        first = axle.standing is not Standing.FAULT
-        self.cell.halt(axle.what.unit)
+        first = ledger.standing is not Standing.FAULT
+        self.cell.halt(ledger.what.unit)
         self._absorb()  # the stepper is told, while it still is
-        axle.standing, axle.why, axle.known = Standing.FAULT, why, known and not axle.lost
-        axle.guard.want({}, self.cell.now, self.cell.now)  # what has left is watched until it is over
+        ledger.standing, ledger.why, ledger.known = Standing.FAULT, why, known and not ledger.lost
+        ledger.guard.want({}, self.cell.now, self.cell.now)  # what has left is watched until it is over
         self.past.clear()
         if first:
-            self._say(Weight.FAULT, f"{axle.name} stands: {why}; look at the machine, then recover")
+            self._say(Weight.FAULT, f"{ledger.name} stands: {why}; look at the machine, then recover")
 
-    def _place(self, axle: Axle, shaft: int) -> None:
+    def _place(self, ledger: AxisLedger, shaft: int) -> None:
         """The motor stands at `shaft`: so the counters say, too."""
-        by = shaft - axle.shaft_at(self.cell.now)
+        by = shaft - ledger.shaft_at(self.cell.now)
         if by:
-            self.cell.displace(axle.what.unit, axle.what.axis, by)
-            axle.displace(by)
+            self.cell.displace(ledger.what.unit, ledger.what.axis, by)
+            ledger.displace(by)
             self._absorb()
 
     def stop(self) -> None:
         """Emergency stop: every board stops at once, and every axis stands until `recover`."""
         self.boards.emergency_stop(self._wall())
-        for axle in self.axles:
-            if axle.standing is Standing.DRIVEN:
-                self._fault(axle, "emergency stop", known=False)
+        for ledger in self.ledgers:
+            if ledger.standing is Standing.DRIVEN:
+                self._fault(ledger, "emergency stop", known=False)
 
     def abandon(self, why: str) -> None:
         """The cell cannot go on: every board stops at once, for good."""
         self.boards.emergency_stop(self._wall())
         self._stores.flush(NEVER)
-        for axle in self.axles:
-            axle.standing, axle.why, axle.known = Standing.FAULT, why, False
-            axle.guard.release()
+        for ledger in self.ledgers:
+            ledger.standing, ledger.why, ledger.known = Standing.FAULT, why, False
+            ledger.guard.release()
         self.abandoned, self._pending = True, False
 
     def recover(self) -> list[str]:
         """Go on from where the motors stand: boards are made ready again. The axes whose board is waited for."""
         waits = []
         failed = {b for b, board in self.boards.boards.items() if board.state.value not in ("ready",)}
-        for axle in self.axles:
-            if axle.standing is Standing.FAULT and axle.what.board not in failed:
-                self._go_on(axle, axle.shaft_at(self.cell.now))
-            elif axle.standing is Standing.FAULT:
-                waits.append(axle.name)
+        for ledger in self.ledgers:
+            if ledger.standing is Standing.FAULT and ledger.what.board not in failed:
+                self._go_on(ledger, ledger.shaft_at(self.cell.now))
+            elif ledger.standing is Standing.FAULT:
+                waits.append(ledger.name)
         if failed:
             self.boards.recover(self._wall())
         return waits
@@ -144,46 +144,46 @@ class Mishaps(TakingBack):
     def _recovered(self, event: Recovered) -> None:
         now = self.clock()
         self.boards.align(now - self._align, now - self._shift)
-        for axle in self.axles:
-            if axle.what.board != event.board:
+        for ledger in self.ledgers:
+            if ledger.what.board != event.board:
                 continue
-            if axle.standing is not Standing.FAULT:
-                self._fault(axle, f"board {event.board} began anew", known=False)
-            shaft = event.shafts.get(axle.name)
+            if ledger.standing is not Standing.FAULT:
+                self._fault(ledger, f"board {event.board} began anew", known=False)
+            shaft = event.shafts.get(ledger.name)
             if shaft is None:
-                what = f"{axle.name}: board {event.board} was restarted, and nobody knows where the motor stands"
+                what = f"{ledger.name}: board {event.board} was restarted, and nobody knows where the motor stands"
                 self._say(Weight.WARNING, f"{what}: send it home before anything else")
-                axle.stepper.adopt(axle.shaft_at(self.cell.now))
-                axle.lost = True
+                ledger.stepper.adopt(ledger.shaft_at(self.cell.now))
+                ledger.lost = True
             else:
-                self._place(axle, shaft)
-                axle.stepper.rewind(shaft)
-                what = f"{axle.name} goes on at {shaft}, as the board has counted"
+                self._place(ledger, shaft)
+                ledger.stepper.rewind(shaft)
+                what = f"{ledger.name} goes on at {shaft}, as the board has counted"
                 unsure = "the motor may have lost steps when it was stopped"
-                if axle.lost:
+                if ledger.lost:
                     unsure = "since the restart nobody knows where the motor stands"
                 self._say(Weight.WARNING, f"{what}; {unsure}")
-            self._driven_again(axle)
+            self._driven_again(ledger)
         for name, level in event.inputs.items():
             self._raw[name] = int(level)
             if self._given.get(name) != int(level):
                 self._give(name, int(level), self.clock())
         self.past.keep()
 
-    def _go_on(self, axle: Axle, shaft: int) -> None:
-        axle.stepper.rewind(shaft)
-        self._driven_again(axle)
-        self._say(Weight.NOTE, f"{axle.name} goes on at {shaft}")
+    def _go_on(self, ledger: AxisLedger, shaft: int) -> None:
+        ledger.stepper.rewind(shaft)
+        self._driven_again(ledger)
+        self._say(Weight.NOTE, f"{ledger.name} goes on at {shaft}")
 
-    def _driven_again(self, axle: Axle) -> None:
-        axle.guard.release()
-        axle.standing, axle.why, axle.known, axle.awaits = Standing.DRIVEN, "", not axle.lost, None
-        unit = self.cell.unit(axle.what.unit)
+    def _driven_again(self, ledger: AxisLedger) -> None:
+        ledger.guard.release()
+        ledger.standing, ledger.why, ledger.known, ledger.awaits = Standing.DRIVEN, "", not ledger.lost, None
+        unit = self.cell.unit(ledger.what.unit)
         for out in self._outs.values():
             levels = out.levels.before(out.levels.count)
             if out.unit == unit and levels:
                 self.boards.outs[out.name].now(levels[-1][1])
-        self._command(axle)
+        self._command(ledger)
         self._pending = True
 
     def _not_written(self, unit: str) -> None:

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import uvicorn
 
-from detent.workbench import hurried
-from detent.workbench.hurried import MOST, Hurried
+from detent.workbench import connections
+from detent.workbench.connections import MOST, LimitedConnection
 
 
 async def everything(scope: Any, receive: Any, send: Any) -> None:
@@ -27,7 +27,7 @@ async def everything(scope: Any, receive: Any, send: Any) -> None:
 @contextlib.asynccontextmanager
 async def served() -> AsyncIterator[tuple[str, int]]:
     listener = socket.create_server(("127.0.0.1", 0), backlog=512)
-    config = uvicorn.Config(everything, http=Hurried, log_level="error", lifespan="off", ws="wsproto")
+    config = uvicorn.Config(everything, http=LimitedConnection, log_level="error", lifespan="off", ws="wsproto")
     server = uvicorn.Server(config)
     server.capture_signals = contextlib.nullcontext  # type: ignore[method-assign, assignment]
     serving = asyncio.create_task(server.serve(sockets=[listener]))
@@ -65,7 +65,7 @@ def test_more_who_say_half_of_something_than_there_are_places_keep_nobody_out() 
         slow = [await say(host, port, b"GET / HT") for _ in range(MOST + 20)]
         reader, writer = await say(host, port, WHOLE)
         assert (await reader.readuntil(b"in")).startswith(b"HTTP/1.1 200 ")
-        assert len(Hurried.open) <= MOST
+        assert len(LimitedConnection.open) <= MOST
         assert await slow[0][0].read() == b"", "the first of them has kept a place for longest"
         for _, one in (*slow, (reader, writer)):
             one.close()
@@ -75,7 +75,7 @@ def test_more_who_say_half_of_something_than_there_are_places_keep_nobody_out() 
 
 @pytest.mark.parametrize("said", [b"", b"GET / HT"])
 def test_who_does_not_say_in_time_what_he_wants_leaves(said: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hurried, "QUIET", 0.01)
+    monkeypatch.setattr(connections, "QUIET", 0.01)
 
     async def talk(host: str, port: int) -> None:
         reader, writer = await say(host, port, said)
@@ -94,7 +94,7 @@ def test_an_open_window_is_left_alone() -> None:
         head = b"GET /live HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n" + key + b"\r\n"
         reader, writer = await say(host, port, head)
         assert (await reader.readuntil(b"\r\n\r\n")).startswith(b"HTTP/1.1 101 ")
-        assert not Hurried.open
+        assert not LimitedConnection.open
         writer.close()
 
     run(talk)
