@@ -37,6 +37,15 @@ hypothesis_settings.register_profile("repeatable", derandomize=True, deadline=No
 hypothesis_settings.load_profile("repeatable")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that share a fixture of their file run in one process under `pytest --dist loadgroup`: it is made once."""
+    for item in items:
+        shared = getattr(item, "_fixtureinfo", None)
+        fixtures = [found for all_ in shared.name2fixturedefs.values() for found in all_] if shared else []
+        if any(one.scope in ("class", "module", "package") and one.baseid for one in fixtures):
+            item.add_marker(pytest.mark.xdist_group(item.nodeid.split("::")[0]))
+
+
 def python(document: Document) -> Iterable[Region]:
     """The Python blocks of a page, to be run in its folder."""
     for region in PythonCodeBlockParser()(document):

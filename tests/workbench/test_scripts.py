@@ -22,7 +22,6 @@ TSC = ROOT / ".venv" / "tsc" / "node_modules" / ".bin" / "tsc"
 PURE = sorted(path.name for path in SCRIPTS.glob("*.test.mjs"))
 
 needs_tsc = pytest.mark.skipif(not TSC.exists(), reason="tsc is not there: make tsc (npm) fetches it")
-one_worker = pytest.mark.xdist_group("tsc")
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
 
 
@@ -52,13 +51,11 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 
 @needs_tsc
-@one_worker
 def test_the_types_of_the_scripts_fit(said: list[str]) -> None:
     assert [line for line in said if "/wrong" not in line] == []
 
 
 @needs_tsc
-@one_worker
 @pytest.mark.parametrize("n", range(len(WRONG)))
 def test_what_does_not_fit_is_told(n: int, said: list[str]) -> None:
     (line,) = (line for line in said if f"/wrong{n}.js(" in line)
