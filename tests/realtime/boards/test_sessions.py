@@ -214,11 +214,11 @@ def same_time(bench: Bench) -> None:
     """What the axes of a unit did at the same time comes at the same time: the lag is of the unit, and only grows."""
     scale = bench.boards.boards["b"].core.scale
     behind: list[tuple[Ns, Ns]] = []
-    for axle in bench.driven.axles:
-        told = pulses(axle.motions.since(0), bench.cell.now)
-        edges = bench.edges(axle.name)
+    for ledger in bench.driven.ledgers:
+        told = pulses(ledger.motions.since(0), bench.cell.now)
+        edges = bench.edges(ledger.name)
         # the input is sampled for each of them, at most 100 us apart: a pulse may be between
-        assert 0 <= abs(len(told) - len(edges)) <= 1, axle.name
+        assert 0 <= abs(len(told) - len(edges)) <= 1, ledger.name
         behind += [(at, scale.time(tick) - at) for (tick, _), (at, _) in zip(edges, told, strict=False)]
     behind.sort()
     worst, before = 0, deque(behind)

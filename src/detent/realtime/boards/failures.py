@@ -47,10 +47,10 @@ class Failures(Rollback):
             case Later(_, stepper, at, _):
                 self._later(self._by_stepper[stepper], at)
             case Slipped(_, stepper, at, by):
-                axle = self._by_stepper[stepper]
-                self._later(axle, at)
-                slips = axle.stepper.slips
-                who = stepper if len(axle.stepper.of.axes) == 1 else axle.what.unit
+                ledger = self._by_stepper[stepper]
+                self._later(ledger, at)
+                slips = ledger.stepper.slips
+                who = stepper if len(ledger.stepper.of.axes) == 1 else ledger.what.unit
                 what = f"{who} slipped by {show_duration(by)}: the computer was late; no step is lost"
                 self._say(Weight.WARNING, f"{what} ({slips} {'slip' if slips == 1 else 'slips'} so far)")
             case CountDiffers(_, stepper, shaft, counted):

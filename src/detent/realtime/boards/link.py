@@ -11,7 +11,7 @@ from collections import deque
 from typing import NamedTuple
 
 from detent.realtime.boards.frames import END, ROOM, SEQUENCES, SMALLEST, Block, Reader, block
-from detent.realtime.boards.fresh import Undo
+from detent.realtime.boards.undo import Undo
 from detent.realtime.pace import WallNs
 from detent.ticks import MS
 
