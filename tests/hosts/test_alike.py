@@ -13,11 +13,12 @@ from detent.cell.cell import Cell
 from detent.cell.host import HostPort
 from detent.hosts.axis import Speeds
 from detent.hosts.dcb274 import BlockingDcb274, Dcb274
-from detent.hosts.errors import BadAnswer, DriverError
+from detent.hosts.errors import BadAnswer, Busy, DriverError, MotionFailed, NoAnswer, PortLost, Refused, Spoken
 from detent.hosts.exchange import LONGEST_ANSWER, Blocking, Operation
 from detent.hosts.genstepper import BlockingGenStepper, GenStepper
 from detent.hosts.gsc200 import BlockingGsC200, GsC200
 from detent.hosts.supersigma import BlockingSupersigma, Supersigma
+from detent.one_line import MOST
 
 DRIVERS: dict[str, Callable[[Any], Any]] = {
     "gs-c200": lambda port: BlockingGsC200(GsC200("gs-c200"), port),
@@ -218,6 +219,22 @@ def test_every_call_on_a_line_that_babbles_ends_in_time_with_a_short_error(model
         assert "\n" not in told
         if name not in ("wait", "wait_idle"):
             assert port.now < (20 if "program" in name or name == "save" else PATIENT[model]), name
+
+
+@pytest.mark.parametrize("kind", [DriverError, NoAnswer, BadAnswer, Refused, Busy, MotionFailed, PortLost])
+def test_whatever_a_device_said_an_error_is_one_short_line(kind: type[DriverError]) -> None:
+    for what in ("answers " + repr("\xff\x1a" * 30_000), "x\ny" * 500, "\x1b[31m", "\0" * 9):
+        error = kind("unit", what, Spoken(b"F\r" * 900, bytes(range(256)) * 200), advice="ask moving() and position()")
+        for told in (str(error), error.told, error.what):
+            assert len(told) <= MOST
+            assert told.isprintable()
+
+
+def test_an_answer_of_fifty_thousand_characters_is_not_quoted_whole() -> None:
+    port = Babbling((b"X" + b"\xa3" * 25_000 + b"\r\n" for _ in iter(int, 1)), character=1e-7)
+    with pytest.raises(DriverError) as told:
+        DRIVERS["dcb-274"](port).divide(2)
+    assert len(str(told.value)) <= MOST
 
 
 @pytest.mark.parametrize("model", DRIVERS)

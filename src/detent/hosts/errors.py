@@ -12,6 +12,8 @@
 
 from typing import Final, NamedTuple
 
+from detent.one_line import one_line
+
 
 class Spoken(NamedTuple):
     """What was sent and what came back, as it was on the wire."""
@@ -32,14 +34,16 @@ class Spoken(NamedTuple):
 class DriverError(RuntimeError):
     """A device or a line does not do what its manual says. `spoken` is the exchange, if there was one.
 
-    `advice` says which call helps; `told` is the error without it, for whoever does not call from Python.
+    `advice` says which call helps; `told` is the error without it, for whoever does not call from Python. Whatever the
+    device said, it is one line, and of much that `what` quotes the middle is left out.
     """
 
     def __init__(self, unit: str, what: str, spoken: Spoken | None = None, advice: str = "") -> None:
+        what = one_line(what, LONGEST)
         exchange = f" ({spoken})" if spoken is not None else ""
-        super().__init__(f"{unit}: {what}" + (f": {advice}" if advice else "") + exchange)
+        super().__init__(one_line(f"{unit}: {what}" + (f": {advice}" if advice else "") + exchange))
         self.unit, self.what, self.spoken, self.advice = unit, what, spoken, advice
-        self.told = f"{unit}: {what}{exchange}"
+        self.told = one_line(f"{unit}: {what}{exchange}")
 
 
 class NoAnswer(DriverError, TimeoutError):
@@ -69,6 +73,8 @@ class MotionFailed(DriverError):
 class PortLost(DriverError, ConnectionError):
     """The port went away."""
 
+
+LONGEST: Final = 300  # characters of what went wrong: the exchange and the advice have room in the line, too
 
 ECHOES: Final = "sends back what it is sent: the line is looped or crossed, or an adapter echoes; nobody answered"
 
