@@ -77,6 +77,10 @@ def test_an_address_that_others_can_reach_needs_a_token() -> None:
         check_place(host, None)
     with pytest.raises(ValueError, match="too short"):
         check_place("0.0.0.0", "short")
+    for token in ("        ", " before it", "behind it\n", "some\udcffwhere", "tab\there", "nul\0nul\0"):
+        with pytest.raises(ValueError, match="cannot be seen"):
+            check_place("127.0.0.1", token)
+    check_place("0.0.0.0", "a word of your öwn")
 
 
 def test_a_page_on_loopback_is_served_to_whoever_asks_by_its_name(loopback: Guard) -> None:
@@ -84,7 +88,16 @@ def test_a_page_on_loopback_is_served_to_whoever_asks_by_its_name(loopback: Guar
         assert status(loopback, ("host", host)) == 200
 
 
-@pytest.mark.parametrize("host", ["evil.example:8080", "127.0.0.1.evil.example", "192.168.1.4:8080", "", "a b", "[::1"])
+FOREIGN = ["evil.example:8080", "127.0.0.1.evil.example", "192.168.1.4:8080", "", "a b", "[::1"]
+HARDLY_A_NAME = [
+    "127.0.0.1:8080.evil.example", "127.0.0.1:8080@evil.example", "evil.example@127.0.0.1:8080",
+    "127.0.0.1/evil.example",
+    "127.0.0.1:", "127.0.0.1:http", "[::1]evil.example", "127.0.0.1:80 ", "127.0.0.1?x", "127.0.0.1#", "127.0.0.1\\x",
+    ":8080",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("host", [*FOREIGN, *HARDLY_A_NAME])
 def test_a_foreign_name_that_points_here_is_refused(loopback: Guard, host: str) -> None:
     assert status(loopback, ("host", host)) == 403
     assert status(loopback, ("host", host), ("origin", f"http://{host}"), kind="websocket") == 1008

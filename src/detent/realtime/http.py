@@ -14,6 +14,7 @@ import contextlib
 import hmac
 import ipaddress
 import json
+import re
 import socket
 import sys
 import threading
@@ -67,8 +68,8 @@ class HttpControl:
 
     def __init__(self, control: VerbHandler, address: TcpAddress, token: str | None = None) -> None:
         """Raises EndpointError if the port cannot be had, or is open to others without a `token`, or that is short."""
-        if token and len(token) < SHORTEST_TOKEN:
-            raise EndpointError(f"--token or ${TOKEN}: it is too short; at least {SHORTEST_TOKEN} characters")
+        if token and (wrong := wrong_token(token)):
+            raise EndpointError(f"--token or ${TOKEN}: {wrong}")
         if not token and not is_loopback(address.host):
             raise EndpointError(
                 f"{address} is open to other computers: give --token TEXT or ${TOKEN}, or listen on 127.0.0.1"
@@ -119,6 +120,24 @@ class HttpControl:
         await self._ending.wait()
         server.close()
         await self._clients.part()
+
+
+def wrong_token(token: str) -> str:
+    """What is wrong with a token, and what it has to be; "" if it can be sent in a header and compared there."""
+    if len(token) < SHORTEST_TOKEN:
+        return f"it is too short; at least {SHORTEST_TOKEN} characters"
+    if not token.isprintable() or token != token.strip():
+        return "it has characters that cannot be seen; take letters, digits and signs, with spaces only between them"
+    return ""
+
+
+_HOST: Final = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[^\s:/?#@\\\[\]]+)(:\d{1,5})?", re.ASCII)
+
+
+def name_of(host: str) -> str:
+    """The name in a Host header, without its port and brackets; "" for what is no name, or has more behind it."""
+    found = _HOST.fullmatch(host)
+    return found["name"].strip("[]").lower() if found is not None else ""
 
 
 def is_loopback(host: str) -> bool:
@@ -310,8 +329,7 @@ class _Clients:
     def _check_sender(self, request: http1.Request) -> None:
         """No pages of other sites, no names that were pointed here, no strangers."""
         host, origin = request.headers.get("host", ""), request.headers.get("origin")
-        name = _split(f"//{host}", "host").hostname or ""
-        if not self._token and not is_loopback(name):
+        if not self._token and not is_loopback(name_of(host)):
             raise _Refused(HTTPStatus.FORBIDDEN, f"host {host!r} is not this one", "ask 127.0.0.1 or localhost")
         if origin is not None and origin not in (f"http://{host}", f"https://{host}"):
             raise _Refused(HTTPStatus.FORBIDDEN, f"origin {origin!r} may not ask", "this is no place for web pages")

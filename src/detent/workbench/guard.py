@@ -15,11 +15,11 @@ import socket
 from collections.abc import Collection, Iterable
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
-from urllib.parse import parse_qsl, quote, urlencode, urlsplit
+from urllib.parse import parse_qsl, quote, urlencode
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from detent.realtime.http import SHORTEST_TOKEN
+from detent.realtime.http import name_of, wrong_token
 
 LOOPBACK_NAMES = ("localhost",)
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
@@ -59,8 +59,8 @@ def check_place(host: str, token: str | None) -> None:
     """Raises ValueError if `host` needs a token that is not there, or the token is none."""
     if token is None and not is_loopback(host):
         raise ValueError(f"--host {host} lets others in: give a word that they must know, with --token")
-    if token is not None and len(token) < SHORTEST_TOKEN:
-        raise ValueError(f"--token: it is too short; at least {SHORTEST_TOKEN} characters")
+    if token is not None and (wrong := wrong_token(token)):
+        raise ValueError(f"--token: {wrong}")
 
 
 class Guard:
@@ -100,7 +100,7 @@ class Guard:
         """Check Host and Origin of a request (`kind` is "http" or "websocket"). Raises Refusal."""
         values = list(headers)
         hosts = [value for name, value in values if name == "host"]
-        if len(hosts) != 1 or not self._known(_name_of(hosts[0])):
+        if len(hosts) != 1 or not self._known(name_of(hosts[0])):
             raise Refusal(403, "This is no name of the machine that Detent runs on; use the address that it printed.")
         origins = [value for name, value in values if name == "origin"]
         if not origins:
@@ -168,14 +168,6 @@ def names_of_this_machine() -> tuple[str, ...]:
     """What this machine calls itself."""
     name = socket.gethostname()
     return (name, name.partition(".")[0], f"{name.partition('.')[0]}.local")
-
-
-def _name_of(host: str) -> str:
-    """The name in a Host header, without its port; "" if it cannot be understood."""
-    try:
-        return urlsplit(f"//{host}").hostname or ""
-    except ValueError:
-        return ""
 
 
 def _digest(text: str) -> bytes:
