@@ -19,6 +19,7 @@ from detent.hosts.errors import DriverError
 from detent.hosts.genstepper import BlockingGenStepper, GenStepper
 from detent.hosts.gsc200 import BlockingGsC200, GsC200
 from detent.hosts.supersigma import BlockingSupersigma, Supersigma
+from detent.hosts.typed import say
 from detent.realtime.connect import HOSTS
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.service import Service
@@ -95,6 +96,49 @@ def test_a_look_at_a_dcb_274_that_runs_a_program_leaves_it_alone() -> None:
     assert (seen.position, seen.moving) == (None, None)
     unit.wait()
     assert unit.position() == 0
+
+
+PROGRAMS = {  # lines that a person types, how they are listed, and what ends program mode
+    "gs-c200": (["P", "+100", "D1"], ["+100", "D1"], "E"),
+    "gs-c200s": (["Po", "+100", "D1"], ["+100", "D1"], "Px"),
+    "dcb-274": (["P 0", "+ 100", "W 0"], ["+ 100", "W 0"], "P"),
+}
+
+
+@pytest.mark.parametrize("model", PROGRAMS)
+def test_looks_between_the_lines_of_a_program_that_is_typed_store_nothing(model: str) -> None:
+    cell, port, unit = emulated(model)
+    lines, _, ends = PROGRAMS[model]
+    for line in lines:
+        assert not unit.perform(say(unit.driver, line)).refused
+        assert unit.driver.programming
+        before, port.sent = port.sent, b""
+        for _ in range(3):
+            seen = unit.perform(look(unit.driver))
+            assert seen.state == "program mode: what is sent is stored"
+        if model == "dcb-274":  # it stores whatever it is sent
+            assert port.sent == b""
+            assert seen.position is None
+        else:  # F and V are obeyed at once
+            assert seen.position == 0
+        port.sent = before + port.sent
+    typed = cell.controller("unit").program_memory()
+    assert not unit.perform(say(unit.driver, ends)).refused
+    assert not unit.driver.programming
+    if model != "gs-c200":  # whose E starts it
+        assert unit.perform(look(unit.driver)).position == 0
+    other, _, alone = emulated(model)
+    for line in lines:
+        alone.perform(say(alone.driver, line))
+    assert typed == other.controller("unit").program_memory()
+
+
+@pytest.mark.parametrize("leave", ["stop", "abort", "reset"])
+def test_a_unit_that_is_stopped_out_of_program_mode_is_looked_at_again(leave: str) -> None:
+    _, _, unit = emulated("dcb-274")
+    unit.perform(say(unit.driver, "P 0"))
+    unit.perform(getattr(unit.driver, leave)())
+    assert unit.perform(look(unit.driver)).state == "at rest"
 
 
 @pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "bs0610"])
@@ -255,6 +299,24 @@ def test_program_and_backup(tmp_path: Path) -> None:
         assert await desk.units.unit_compare(name, "+ 500\nW 0\n") == []
 
     with served("dcb-274", pace=100) as address:
+        at_desk(tmp_path, scene)
+
+
+@pytest.mark.parametrize(("model", "begin", "end"), [("gs-c200s", "Po", "Px"), ("dcb-274", "P 0", "P")])
+def test_a_hand_moves_nothing_into_a_program_that_is_typed(tmp_path: Path, model: str, begin: str, end: str) -> None:
+    async def scene(desk: Desk) -> None:
+        name = await desk.units.unit_connect(model, address)
+        await desk.until(name, lambda facts: facts["position"] == 0)
+        await desk.units.unit_say(name, begin)
+        for move in (desk.units.unit_move(name, "jog", 10), desk.units.unit_move(name, "zero"),
+                     desk.units.unit_hold(name, 100.0)):  # fmt: skip
+            with pytest.raises(ValueError, match=rf"program mode: a command would be stored, and nothing move; {end}"):
+                await move
+        await desk.units.unit_say(name, end)
+        await desk.units.unit_move(name, "jog", 10)
+        await desk.until(name, lambda facts: facts["position"] == 10)
+
+    with served(model) as address:
         at_desk(tmp_path, scene)
 
 

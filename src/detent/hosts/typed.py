@@ -247,7 +247,7 @@ def _dcb274(driver: Dcb274, text: str, seconds: float, heard: Heard) -> Steps[Sa
         yield from driver.store_name(text[2:].strip())
         return Said((), "named, for good")
     listing = re.fullmatch(r"Q ?(\d*)", text)
-    if listing and driver.mode == "single":
+    if listing and driver.mode == "single" and not driver.programming:
         found = yield from driver.listing(int(listing[1] or 0))
         return Said((*map(str, found.lines), str(found.end)), "" if found.lines else "no program there")
     begun = re.fullmatch(r"G ?(\d*)(?: ([01]))?", text)

@@ -328,26 +328,26 @@ class Commands(Unit):
             return
         if not self._connected:
             yield from self.connect()
-        if self._storing:
+        if self._storing or self.programming:
             yield from self._leave_program_mode()
         yield from self._way.interrupt(letter.encode())
 
     def _stop_alone(self, way: SingleMode) -> Steps[None]:
         if not self._connected and not self._broken:
             yield from attempt(self.connect())
-        known = self._connected and not self._storing
+        known = self._connected and not self._storing and not self.programming
         try:
             yield from way.soft_stop(known=known)
         except GeneratorExit:
             self._connected, self._broken = False, True
             raise
-        way.running = self._storing = False
+        way.running = self._storing = self.programming = False
 
     def _leave_program_mode(self) -> Steps[None]:
         """Where lines are stored nothing is told about the motion; P ends that (page 47)."""
-        if not (yield from self._line("^")).strip():
-            yield from self._line("P", SAVING)
-        self._storing = False
+        if not (yield from self._line("^", typed=True)).strip():
+            yield from self._line("P", SAVING, typed=True)
+        self._storing = self.programming = False
 
     @operation
     def abort(self) -> Steps[None]:
@@ -355,4 +355,4 @@ class Commands(Unit):
         self._stops += 1
         self._leave(None)
         yield from self._way.escape()
-        self._way.running = False
+        self._way.running = self.programming = False

@@ -57,7 +57,7 @@ class Unit(Axis):
         self.name = name
         self.title = self._way.title
         self.version = ""  # as the sign-on line tells
-        self.programming = False  # a line of ours has begun program mode: lines are stored
+        self.programming = False  # `command` has begun program mode: whatever it is sent is stored
         self.left_over = ""  # where the last look at all programs found what is left of older ones, like "7-20, 300"
         self._connected = False
         self._broken = False  # an operation was broken off: something may stand in the line, or be under way
@@ -86,7 +86,7 @@ class Unit(Axis):
         self.version = (yield from self._way.connect()) or self.version
         self._connected, self._broken = True, False
         if isinstance(self._way, SingleMode):
-            self._storing = False  # X was answered
+            self._storing = self.programming = False  # X was answered
             self.name = self._settings(self._way.examined).name
             self.title = self._way.title = f"DCB-274 {self.name}"
         return self.version
@@ -106,11 +106,13 @@ class Unit(Axis):
                 if not (isinstance(self._way, SingleMode) and self._way.programming):
                     raise
                 return (yield from self._enter(text, seconds))
-        return (yield from self._line(text, seconds))
+        return (yield from self._line(text, seconds, typed=True))
 
-    def _line(self, text: str, seconds: float = QUICK) -> Steps[str]:
-        """One line to a unit that is ready for it."""
+    def _line(self, text: str, seconds: float = QUICK, *, typed: bool = False) -> Steps[str]:
+        """One line to a unit that is ready for it. Raises Busy where it would be stored, unless somebody typed it."""
         self._fits(text)
+        if self.programming and not typed:
+            raise Busy(self.title, "is in program mode, where what it is sent is stored", advice="P ends that mode")
         if not self._connected:
             yield from self.connect()
         if self._way.running:
@@ -195,7 +197,7 @@ class Unit(Axis):
         self._stops += 1
         self._leave(None)
         yield from self._way.restart(character)
-        self._way.running = False
+        self._way.running = self.programming = False
         self.forget()
 
     # -- names and adapters ------------------------------------------------------------------------------

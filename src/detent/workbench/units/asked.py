@@ -15,6 +15,8 @@ from detent.hosts.genstepper import GenStepper
 from detent.hosts.gsc200 import GsC200
 from detent.hosts.supersigma import Supersigma
 
+STORES: Final = "program mode: what is sent is stored"
+
 
 class Fact(NamedTuple):
     """One thing that a unit told, as it is shown; None: it does not tell, or not now. `source`: how it was asked."""
@@ -57,7 +59,7 @@ def _(driver: GsC200) -> Steps[Look]:
         busy, ended = False, error.what
     position: int | None = None
     pins: list[str | None] = [None] * len(_PINS)
-    state = "busy" if busy else ended or "ready"
+    state = STORES if driver.programming else "busy" if busy else ended or "ready"
     if not busy:
         try:
             position = yield from driver.position()
@@ -77,6 +79,9 @@ def _(driver: GsC200) -> Steps[Look]:
 def _(driver: Dcb274) -> Steps[Look]:
     """^, Z, ] 0 and A 129; in single mode at rest X, too. While a program runs it takes no line."""
     names = ("limit A", "limit B", "home")
+    if driver.programming:  # it would store a question
+        facts = tuple(Fact(name, None, "it is in program mode: P ends that", lamp=True) for name in names)
+        return Look(STORES, None, None, None, facts)
     try:
         status = yield from driver.moving_status()
     except Busy:

@@ -41,6 +41,16 @@ def manual_moves(driver: Axis) -> ManualMoves:
     return ManualMoves(hold, home, unit, before_hold, before_home)
 
 
+def check_moves(driver: Axis) -> None:
+    """Raises ValueError where a command would be stored instead of obeyed: somebody types a program."""
+    if not getattr(driver, "programming", False):
+        return
+    ends = "P ends that"
+    if isinstance(driver, GsC200):
+        ends = "Px ends that" if driver.signed else "E ends that, and starts the program"
+    raise ValueError(f"the unit is in program mode: a command would be stored, and nothing move; {ends}")
+
+
 def jog(driver: Axis, steps: int) -> Steps[None]:
     """Move by `steps`. Raises ValueError, DriverError."""
     _some(steps)

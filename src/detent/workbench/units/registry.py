@@ -110,6 +110,7 @@ class Units:
         """Jog by `value` steps, go to it, call where the axis stands zero, find home; what was sent, in words."""
         unit = self._unit(name)
         axis = _axis(unit)
+        manual.check_moves(axis)
         steps: Steps[None]
         match what:
             case "jog":

@@ -18,7 +18,7 @@ from detent.realtime.connect import connect_async, host
 from detent.workbench.live import Value
 from detent.workbench.stopping import StopFailed
 from detent.workbench.units.asked import Look, look
-from detent.workbench.units.manual import ManualMoves, manual_moves
+from detent.workbench.units.manual import ManualMoves, check_moves, manual_moves
 from detent.workbench.units.manual import run as run_at
 from detent.workbench.units.tap import Tap
 from detent.workbench.units.transcript import Transcript
@@ -276,6 +276,7 @@ class Unit:
             raise ValueError(self.manual.hold)
         driver = self.shell.driver
         assert isinstance(driver, Axis)
+        check_moves(driver)
         self._held_until = asyncio.get_running_loop().time() + HOLD_SECONDS
         self._guard = asyncio.create_task(self._dead_man())
         try:
