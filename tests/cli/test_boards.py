@@ -2,6 +2,9 @@
 
 import io
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -108,3 +111,19 @@ def test_asked_wrongly(words: tuple[str, ...], error: str, capsys: pytest.Captur
     assert (status, out) == (2, "")
     assert error in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_whatever_ends_it_no_motor_turns_on(number: int) -> None:
+    """Ctrl-C, `kill`, a terminal that is closed: the board is stopped before the process goes."""
+    cell = EXAMPLES / "pico-gs-c200.toml"
+    words = [sys.executable, "-m", "detent", "boards", "check", str(cell), "--watch", "0", "--yes", "--speed", "20"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=0) as process:
+        assert process.stdout is not None
+        told = ""
+        while not told.endswith("  plus  "):
+            told += process.stdout.read(1)
+        process.send_signal(number)
+        _, wrong = process.communicate(timeout=60)
+    assert process.returncode == (130 if number == signal.SIGINT else 128 + number)
+    assert wrong == "detent: stopped by hand; the boards are shut down, and their outputs off\n"

@@ -122,8 +122,8 @@ def main(tokens: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:
         sys.exit(130)
     finally:
-        if before is not None:
-            signal.signal(signal.SIGTERM, before)
+        for ending, handler in before.items():
+            signal.signal(ending, handler)
 
 
 def _nobody_reads() -> NoReturn:
@@ -132,12 +132,17 @@ def _nobody_reads() -> NoReturn:
     sys.exit(FAILED)
 
 
-def _hear_termination() -> Any:
-    """SIGTERM ends a verb as Ctrl-C does, so that it tidies up: no temporary file stays. Returns how it was before."""
+def _hear_termination() -> dict[int, Any]:
+    """SIGTERM and a terminal that is closed end a verb as Ctrl-C does, so that it tidies up.
+
+    No temporary file stays, no motor turns on. Returns how it was before; what somebody ignores (nohup) stays so.
+    """
     if threading.current_thread() is not threading.main_thread():
-        return None
+        return {}
 
     def terminated(number: int, _: object) -> None:
         sys.exit(128 + number)
 
-    return signal.signal(signal.SIGTERM, terminated)
+    endings = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    heard = [number for number in endings if signal.getsignal(number) is not signal.SIG_IGN]
+    return {number: signal.signal(number, terminated) for number in heard}

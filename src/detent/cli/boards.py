@@ -215,10 +215,18 @@ def _check(
 
 
 def _print_boards(check: "Check", described: "Description") -> None:
+    from detent.ticks import show_duration
+
     for setup, address in check.plan.setups:
         print(f"Board {setup.name}: {address}, ready. Nothing moves.")
+        for axis in setup.steppers:
+            way = f"direction {axis.dir}" if axis.minus is None else f"minus {axis.minus}"
+            print(f"  axis   {axis.name:<16} steps {axis.step}, {way}, pulses of {show_duration(axis.pulse)}")
         for out in setup.outs:
             print(f"  output {out.name:<16} {out.pin}, at rest {int(out.off)}")
+        for chip in setup.drivers:
+            where = f"select {chip.select}" if chip.uart is None else f"uart {chip.uart}, address {chip.address}"
+            print(f"  driver {chip.name:<16} {chip.kind}, {where}: it answers, and has its currents")
 
 
 def _show(check: "Check", helps: dict[tuple[str, str], str], watch: float | None, terminal: bool, json: bool) -> None:
@@ -284,18 +292,30 @@ def _jog(
             return []
         if terminal:
             print("Enter stops it at once.", flush=True)
-    legs = []
-    for leg in check.jog(axis, count, rate, _typed if terminal else lambda: False):
-        legs.append(leg)
+    legs: list[Leg] = []
+    jog = check.jog(axis, count, rate, _typed if terminal else lambda: False)
+    for way in ("plus", "minus"):
+        if legs and not legs[-1].made:
+            break
+        if not json:  # the way is told while the motor turns
+            print(f"  {way:<5} ", end="", flush=True)
+        try:
+            legs.append(next(jog))
+        except BaseException as error:
+            if not json:
+                print(flush=True)
+            if isinstance(error, (KeyboardInterrupt, SystemExit)):
+                tell("stopped by hand; the boards are shut down, and their outputs off")
+            raise
         if not json:
-            _print_leg(leg)
+            _print_leg(legs[-1])
+    next(jog, None)  # its driver is let go
     return legs
 
 
 def _print_leg(leg: "Leg") -> None:
-    way = "plus" if leg.direction > 0 else "minus"
     ended = f"stopped: {leg.why}" if leg.why else "as many as were asked"
-    print(f"  {way:<5} {leg.made} of {leg.asked} pulses, {ended}", flush=True)
+    print(f"{leg.made} of {leg.asked} pulses, {ended}", flush=True)
     for met in leg.met:
         print(f"        {met.input} became {met.level} after {met.steps}")
 
