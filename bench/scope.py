@@ -14,6 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from bench.rows import Row
 
@@ -55,7 +56,7 @@ def _looked_at(chromium: str, url: str, pid: int) -> tuple[float, float, float]:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": POINTS + 260, "height": 900})
         page.add_init_script("localStorage.setItem('detent.tour', 'seen')")
-        page.goto(url.rstrip("/") + "/scope")
+        page.goto(urlsplit(url)._replace(path="/scope").geturl())
         page.wait_for_function(f"() => Number({_SCOPE}?.dataset.frames) > 0")
         page.evaluate(f"(shown) => {{ const {{scope}} = {_SCOPE}; scope.shown = shown; scope.arrange(); }}", TRACES)
         page.wait_for_function(f"() => {_SCOPE}.scope.frame.traces.length === 3")

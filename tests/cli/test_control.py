@@ -208,3 +208,12 @@ def test_serve_refuses_what_is_open_to_everybody(
         main(["serve", "gs-c200", "--state", str(tmp_path), "--control", address])
     assert exited.value.code == 2
     assert says in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("token", ["a\nb", "日本語日本語日本語", "some\udcffwhere"])
+def test_a_token_that_no_request_can_carry_is_told_as_such(
+    url: str, token: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, _, err = run(capsys, url, "--token", token)
+    assert status == 2
+    assert err == "detent: the token has characters that no request can have; give the one of serve\n"

@@ -215,6 +215,14 @@ def test_a_token_that_can_be_guessed_is_refused(host: str) -> None:
         HttpControl(control, TcpAddress(host, 0), "x")
 
 
+@pytest.mark.parametrize(
+    "token", ["        ", "a word\nof two", " before it", "nul\0nul\0nul", "日本語日本語日本語", "some\udcffwhere"]
+)
+def test_a_token_that_no_request_can_carry_is_refused(token: str) -> None:
+    with controlled(one()) as control, pytest.raises(EndpointError, match=r"--token or \$DETENT_TOKEN: it has "):
+        HttpControl(control, TcpAddress("127.0.0.1", 0), token)
+
+
 def test_a_token_opens_it_to_other_computers() -> None:
     with controlled(one()) as control:
         http = HttpControl(control, TcpAddress("0.0.0.0", 0), TOKEN)

@@ -95,6 +95,9 @@ def placed(verb: "Verb", words: Sequence[str]) -> dict[str, str]:
     return found
 
 
+LAST_LATIN = 0xFF  # what comes behind that no header of a request can have
+
+
 def _ask(url: str, verb: "Verb", given: Mapping[str, str], token: str | None, patience: float) -> dict[str, Any]:
     """The answer. Ends the program with a line on stderr if there is none."""
     from http.client import HTTPConnection, HTTPException
@@ -110,7 +113,11 @@ def _ask(url: str, verb: "Verb", given: Mapping[str, str], token: str | None, pa
         host = port = None
     if host is None or port is None or parts.scheme != "http":
         asked_wrongly(AskedWrongly(f"{url!r} is no URL of a service", "write it like http://127.0.0.1:8400"))
-    headers = {"Content-Type": "application/json"} | ({"Authorization": f"Bearer {token}"} if token else {})
+    headers = {"Content-Type": "application/json"}
+    if token:
+        if not token.isprintable() or any(ord(letter) > LAST_LATIN for letter in token):
+            asked_wrongly(AskedWrongly("the token has characters that no request can have", "give the one of serve"))
+        headers["Authorization"] = f"Bearer {token}"
     connection = HTTPConnection(host, port, timeout=patience)
     try:
         connection.request("POST", f"/{verb.name}", json_text.dumps(given), headers)

@@ -39,6 +39,7 @@ MOST_CLIENTS: Final = 128  # at once; one more takes the place of the one that h
 MOST_WAITING: Final = 64  # of them that wait for the cell
 PARTING: Final = 0.5  # seconds in which clients take their last answers when it ends
 SHORTEST_TOKEN: Final = 8  # characters
+LAST_LATIN: Final = 0xFF  # the last character that a header can have
 TOKEN: Final = "DETENT_TOKEN"  # the variable of the environment
 
 
@@ -128,6 +129,8 @@ def wrong_token(token: str) -> str:
         return f"it is too short; at least {SHORTEST_TOKEN} characters"
     if not token.isprintable() or token != token.strip():
         return "it has characters that cannot be seen; take letters, digits and signs, with spaces only between them"
+    if any(ord(letter) > LAST_LATIN for letter in token):
+        return f"it has {max(token)!r}, which no header of a request can have; take Latin letters, digits and signs"
     return ""
 
 
