@@ -10,7 +10,10 @@ from typing import Any
 
 import pytest
 
+from detent.cell.build import build
+from detent.cell.description import parse
 from detent.cli import main
+from detent.cli.serve import unreal
 
 COMMAND = [sys.executable, "-c", "from detent.cli import main; main()", "serve"]
 TWO_LINES = '[units.bar]\nmodel = "gs-c200"\n[units.drill]\nmodel = "gs-c200s"\n'
@@ -242,3 +245,19 @@ def test_real_pins_need_their_tables_and_real_time(tmp_path: Path, capsys: pytes
             main(["serve", *map(str, choices), "--state", str(tmp_path)])
         assert ended.value.code == 2
         assert error in capsys.readouterr().err
+
+
+def test_what_of_a_cell_has_no_real_pins_is_said() -> None:
+    """Nobody waits for a motor that is none: --real forgotten, a table left out, a board on which nothing hangs."""
+    text = '[units.a]\nmodel = "gs-c200"\n[units.b]\nmodel = "gs-c200"\n'
+    hung = (
+        '[boards.one]\nserial = "fake:"\n[boards.two]\nserial = "fake:"\n[hardware.a]\nboard = "one"\nstep = "gpio2"\n'
+        'dir = "gpio3"\nunwired = ["EOT", "HOME"]\n'
+    )
+    for cell, driven, said in (
+        (text, True, []),
+        (text + hung, False, ["No pin is driven: with --real the motors on one would move."]),
+        (text + hung, True, ["Without real pins: b ([hardware.b] would give it some)", "Nothing hangs on two"]),
+    ):
+        described = parse(cell, "cell.toml")
+        assert unreal(described, build(described, lambda name: ""), driven=driven) == said

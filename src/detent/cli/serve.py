@@ -286,6 +286,8 @@ def _print_ready(
             axes = ", ".join(ledger.name for ledger in service.driven.ledgers if ledger.what.board == state.board)
             lead = service.driven.plan.lead / 1e6
             print(f"Real pins of {state.board} ({state.firmware}): {axes or 'no axis'}; {lead:g} ms behind")
+    for line in unreal(description, service.cell, driven=service.driven is not None):
+        print(line)
     print("Connect:")
     width = max(len(endpoint.unit) for endpoint in service.endpoints)
     commands = [(endpoint, _command(endpoint)) for endpoint in service.endpoints]
@@ -297,6 +299,24 @@ def _print_ready(
     for hint in _hints(description):
         print(hint)
     print("Ctrl-C ends it.", flush=True)
+
+
+def unreal(description: "Description", cell: "Cell", *, driven: bool) -> list[str]:
+    """What of a cell with boards has no real pins, so that nobody waits for a motor that is none."""
+    if not description.hardware:
+        return []
+    used = list(dict.fromkeys(table.board for table in description.hardware.values()))
+    if not driven:
+        return [f"No pin is driven: with --real the motors on {', '.join(used)} would move."]
+    units = {key.partition(".")[0] for key in description.hardware}
+    told = []
+    alone = [unit for unit in cell.controllers() if unit not in units]
+    if alone:
+        told.append(f"Without real pins: {', '.join(alone)} ([hardware.{alone[0]}] would give it some)")
+    spare = [name for name in description.boards if name not in used]
+    if spare:
+        told.append(f"Nothing hangs on {', '.join(spare)}")
+    return told
 
 
 def _hints(description: "Description") -> list[str]:
