@@ -1,12 +1,14 @@
 """The verb `motor`: lists, curves, judged moves, figures, and what it says to nonsense."""
 
 import json
+import os
 from pathlib import Path
 
 import pytest
 
 from detent.cli import main
 from detent.motors.named import MOTORS
+from detent.realtime import texts
 
 
 def said(capsys: pytest.CaptureFixture[str], *tokens: str) -> str:
@@ -176,3 +178,19 @@ def test_nonsense_is_refused_in_one_line(tokens: list[str], words: str, capsys: 
     error = capsys.readouterr().err
     assert words in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes that have names")
+@pytest.mark.parametrize(
+    "tokens", [["FILE"], ["MOTOR", "--curve", "FILE"], ["MOTOR", "--load-by", "FILE"], ["MOTOR", "--ring-down", "FILE"]]
+)
+def test_a_pipe_to_which_nobody_writes_is_not_waited_for(
+    tokens: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(texts, "PIPE", 0.01)
+    os.mkfifo(tmp_path / "pipe.toml")
+    words = [{"FILE": str(tmp_path / "pipe.toml"), "MOTOR": "as1010"}.get(one, one) for one in tokens]
+    with pytest.raises(SystemExit) as ended:
+        main(["motor", *words])
+    assert ended.value.code in (1, 2)
+    assert "it is a pipe, and nobody writes to it" in capsys.readouterr().err

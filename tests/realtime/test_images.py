@@ -349,3 +349,37 @@ def test_the_image_before_the_last_is_kept_and_named_when_that_is_damaged(images
     assert unpack(old.read_bytes(), "gs-c200") == b"first"
     images.path("bar").write_bytes(b"?")
     assert images.load().reports[0].endswith(f"{old} is the image before it: rename it to use it")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes that have names")
+@pytest.mark.parametrize("kind", ["pipe", "link to a device", "folder", "link to a pipe", "huge"])
+def test_what_stands_under_the_name_of_a_cell_and_is_no_key_is_neither_waited_for_nor_read_for_ever(
+    tmp_path: Path, kind: str
+) -> None:
+    state, target = tmp_path / "state", tmp_path / "cell.toml"
+    state.mkdir()
+    target.write_text("")
+    for place in (state / "another.cell", state / "cell.cell"):
+        match kind:
+            case "pipe":
+                os.mkfifo(place)
+            case "link to a device":
+                place.symlink_to("/dev/zero")
+            case "folder":
+                place.mkdir()
+            case "link to a pipe":
+                os.mkfifo(tmp_path / f"{place.name}.pipe")
+                place.symlink_to(tmp_path / f"{place.name}.pipe")
+            case "huge":
+                with place.open("wb") as file:
+                    file.truncate(1 << 40)
+    if kind == "folder":
+        with pytest.raises(ImagesUnusable, match="cannot be kept"):
+            Images.of(state, str(target), {"u": "gs-c200"}, is_file=True)
+        return
+    images = Images.of(state, str(target), {"u": "gs-c200"}, is_file=True)
+    assert images.save("u", b"image")
+    images.close()
+    again = Images.of(state, str(target), {"u": "gs-c200"}, is_file=True)
+    assert again.load().images == {"u": b"image"}
+    again.close()

@@ -1,6 +1,7 @@
 """Who is let in, and what files a window can reach."""
 
 import asyncio
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import pytest
 
 from detent.workbench.drafts import LONGEST, Draft, Drafts
-from detent.workbench.folder import Folder, OutsideFolder
+from detent.workbench.folder import LARGEST, Folder, OutsideFolder
 from detent.workbench.guard import Guard, check_place, is_loopback
 
 TOKEN = "a word of my own"
@@ -295,3 +296,39 @@ def test_a_damaged_draft_counts_as_none_and_is_not_in_the_way(tmp_path: Path) ->
     assert drafts.get("bar") is None
     drafts.keep("bar", Draft("two"))
     assert drafts.get("bar") == Draft("two")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="a system without pipes that have names")
+def test_a_pipe_in_the_folder_is_not_waited_for(folder: Folder) -> None:
+    os.mkfifo(folder.root / "pipe.gsc")
+    assert "pipe.gsc" not in folder.names()
+    assert folder.told("pipe.gsc") is None
+    with pytest.raises(OSError, match="no such file"):
+        folder.read("pipe.gsc")
+    with pytest.raises(OutsideFolder, match="is a pipe or a device; give the file another name"):
+        folder.write("pipe.gsc", b"+250")
+
+
+def test_a_file_without_an_end_is_told_as_far_as_it_matters(folder: Folder) -> None:
+    with (folder.root / "huge.gsc").open("wb") as file:
+        file.truncate(1 << 40)
+    told = folder.told("huge.gsc")
+    assert told is not None
+    assert len(told) == LARGEST + 1
+    with pytest.raises(ValueError, match="that is no file for the workbench"):
+        folder.read("huge.gsc")
+
+
+def test_a_draft_follows_no_link_and_waits_for_no_pipe(tmp_path: Path) -> None:
+    drafts, mine = Drafts(tmp_path, "cell-1"), tmp_path / "mine.txt"
+    mine.write_text("of somebody")
+    drafts.keep("bar", Draft("+250", "bar.gsc"))
+    (kept,) = (tmp_path / "drafts").iterdir()
+    for put in (lambda: kept.symlink_to(mine), lambda: kept.symlink_to("/dev/zero"), lambda: os.mkfifo(kept)):
+        kept.unlink()
+        put()
+        assert drafts.get("bar") is None
+        drafts.keep("bar", Draft("+251", "bar.gsc"))
+        assert drafts.get("bar") == Draft("+251", "bar.gsc")
+        assert not kept.is_symlink()
+    assert mine.read_text() == "of somebody"

@@ -3,6 +3,7 @@
 `RigOptions` is what may be given, `made` turns it into a `Rig` with a word on everything that was assumed.
 """
 
+import errno
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -279,11 +280,14 @@ def _ring_down(rig: "Rig", text: str) -> Any:
 def text_of(file: Path) -> str:
     """What a file says. MotorError if it is no text, or much too long; OSError."""
     from detent.motors.motor import MotorError
+    from detent.realtime.texts import read_whole
 
-    with file.open("rb") as opened:
-        data = opened.read(LONGEST_FILE + 1)
-    if len(data) > LONGEST_FILE:
-        raise MotorError(f"{file}: more than {LONGEST_FILE // 1_000_000} MB: this is no such file")
+    try:
+        data = read_whole(file, LONGEST_FILE)
+    except OSError as error:
+        if error.errno != errno.EFBIG:
+            raise
+        raise MotorError(f"{file}: more than {LONGEST_FILE // 1_000_000} MB: this is no such file") from None
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

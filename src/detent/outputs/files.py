@@ -57,26 +57,27 @@ def _is_ours(path: Path) -> bool:
     return not size or any(mark in ends for mark in _MARKS)
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_whole(path: Path, data: bytes, *, follow: bool = True) -> None:
     """Make `data` the content of `path`: afterwards the file is the old one or the new one, never a part.
 
     See :func:`open_whole`, for data that comes in pieces.
     """
-    with open_whole(path) as file:
+    with open_whole(path, follow=follow) as file:
         file.write(data)
 
 
 @contextmanager
-def open_whole(path: Path) -> Iterator[BinaryIO]:
+def open_whole(path: Path, *, follow: bool = True) -> Iterator[BinaryIO]:
     """A file to write to; its content becomes that of `path` when the block ends, and never if it raises.
 
     The data goes to a temporary file in the same folder, is flushed to the disk and takes the name in one
     step; a file that was there gives its permissions, and a link keeps pointing to the file it names. What
-    is no regular file (a pipe, a terminal) is written straight, as nothing can be kept whole there. Raises
+    is no regular file (a pipe, a terminal) is written straight, as nothing can be kept whole there. Where it does not
+    `follow`, the file takes the place of a link or a pipe itself: so it is in folders that are our own. Raises
     OSError with the name of `path` if it cannot be done; the temporary file is then gone.
     """
     try:
-        with _opened(path) as file:
+        with _opened(path, follow) as file:
             yield file
     except OSError as error:
         error.filename, error.filename2 = str(path), None
@@ -84,13 +85,13 @@ def open_whole(path: Path) -> Iterator[BinaryIO]:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[BinaryIO]:
-    if path.exists() and not path.is_file():
+def _opened(path: Path, follow: bool) -> Iterator[BinaryIO]:
+    if follow and path.exists() and not path.is_file():
         with path.open("wb") as straight:
             yield straight
         return
-    target = path.resolve()
-    mode = target.stat().st_mode & 0o777 if target.exists() else None
+    target = path.resolve() if follow else path
+    mode = target.stat().st_mode & 0o777 if target.is_file() and not (target.is_symlink() and not follow) else None
     temporary, descriptor = _create_beside(target)
     try:
         with os.fdopen(descriptor, "wb") as file:

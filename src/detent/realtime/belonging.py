@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from detent.controllers.catalogue import MODELS
+from detent.realtime.kept import read_kept
 from detent.realtime.system import NO_LINK, lock
 
 SUFFIX = ".eeprom"
@@ -134,8 +135,7 @@ def _keys(folder: Path) -> Iterator[Key]:
     """Every `NAME.cell` that can be read."""
     for place in sorted(folder.glob("*.cell")):
         try:
-            with place.open("rb") as file:
-                facts = tomllib.loads(file.read(_MOST_KEY).decode())
+            facts = tomllib.loads(read_kept(place, _MOST_KEY).decode())
             yield Key(place.name.removesuffix(".cell"), str(facts["path"]), str(facts["file"]), str(facts["units"]))
         except (OSError, ValueError, KeyError, RecursionError):
             continue
@@ -145,7 +145,7 @@ def _write_key(folder: Path, key: Key) -> None:
     place = folder / f"{key.name}.cell"
     text = _HEAD + "".join(f"{name} = {json.dumps(value)}\n" for name, value in key._asdict().items() if name != "name")
     with suppress(OSError, UnicodeDecodeError):
-        if not place.is_symlink() and place.read_text("utf-8") == text:
+        if read_kept(place, _MOST_KEY).decode() == text:
             return
     temporary = place.with_name(f"{place.name}.new")
     temporary.unlink(missing_ok=True)

@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import NamedTuple, Self
 
 from detent.realtime.belonging import SUFFIX, claim, safe
-from detent.realtime.system import NO_LINK, NO_WAIT, lock
+from detent.realtime.kept import read_kept
+from detent.realtime.system import NO_LINK, lock
 
 MOST_BYTES = 1 << 20  # of a file: the memories of the controllers have thousands
 REMEDY = "choose another place with --state DIR"
@@ -117,7 +118,7 @@ class Images:
             model = self._models[unit]
             try:
                 try:
-                    found.images[unit] = unpack(_read(path), model)
+                    found.images[unit] = unpack(read_kept(path, MOST_BYTES + 1), model)
                 except OtherModel as other:
                     found.reports.append(self._set_apart(unit, other))
                     found.images[unit] = self._taken_back(unit, found.reports)
@@ -147,7 +148,7 @@ class Images:
     def _taken_back(self, unit: str, reports: list[str]) -> bytes:
         """The image that the unit kept when it was this model before. Raises FileNotFoundError."""
         path, apart = self._paths[unit], self._of_model(unit, self._models[unit])
-        image = unpack(_read(apart), self._models[unit])
+        image = unpack(read_kept(apart, MOST_BYTES + 1), self._models[unit])
         apart.rename(path)
         reports.append(f"{apart} is {path} again: {unit} is a {self._models[unit]}")
         return image
@@ -235,13 +236,6 @@ def _check_kind(path: Path) -> None:
         what = f"a file of {found.st_size} bytes"
     if what:
         raise ImagesUnusable(f"{path} is {what} and no EEPROM image: move it away, or {REMEDY}")
-
-
-def _read(path: Path) -> bytes:
-    """The content of an image's file, no link followed and nothing waited for. Raises OSError."""
-    descriptor = os.open(path, os.O_RDONLY | NO_LINK | NO_WAIT)
-    with os.fdopen(descriptor, "rb") as file:
-        return file.read(MOST_BYTES + 1)
 
 
 def _locked(folder: Path, path: Path) -> int:

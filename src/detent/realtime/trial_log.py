@@ -10,6 +10,8 @@ from typing import Any, Self
 
 from detent.realtime.system import lock
 
+MOST_BYTES = 64 << 20  # of a log that is gone on with: years of trials
+
 
 class LogUnusable(OSError):
     """A file that cannot be the log. The text says why, and what to do."""
@@ -42,7 +44,9 @@ class TrialLog:
         except OSError:
             pass  # a file system without locks
         self._file.seek(0)
-        data = self._file.read()
+        data = self._file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise LogUnusable(f"{self.path} has more than {MOST_BYTES >> 20} MiB: choose another place with --log FILE")
         whole = data[: data.rfind(b"\n") + 1]
         found: list[Mapping[str, Any]] = []
         for number, line in enumerate(whole.splitlines(), 1):

@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from detent.outputs.files import write_whole
+from detent.realtime.kept import read_kept
 
 LONGEST = 1 << 20  # characters of one draft: no program comes near it
+_MOST_BYTES = 12 * LONGEST + 4096  # of its file: a character may be two escapes
 _SUFFIX = ".draft.json"
 
 
@@ -37,7 +39,7 @@ class Drafts:
     def get(self, name: str) -> Draft | None:
         """The draft of that name; None if there is none, or its file cannot be understood."""
         try:
-            kept = json.loads(self._path(name).read_text("utf-8"))
+            kept = json.loads(read_kept(self._path(name), _MOST_BYTES))
             return Draft(str(kept["text"]), str(kept["file"]))
         except (OSError, ValueError, KeyError, TypeError):
             return None
@@ -47,7 +49,9 @@ class Drafts:
         if len(draft.text) > LONGEST:
             raise ValueError(f"a draft of {len(draft.text)} characters is too long; at most {LONGEST} are kept")
         self._folder.mkdir(parents=True, exist_ok=True)
-        write_whole(self._path(name), json.dumps({"name": name, **draft._asdict()}, ensure_ascii=False).encode())
+        write_whole(
+            self._path(name), json.dumps({"name": name, **draft._asdict()}, ensure_ascii=False).encode(), follow=False
+        )
 
     def forget(self, name: str) -> None:
         """Remove the draft of that name, if there is one. Raises OSError."""

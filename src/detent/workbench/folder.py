@@ -52,9 +52,12 @@ class Folder:
         return path.read_bytes()
 
     def told(self, name: str) -> bytes | None:
-        """What is in a file, however long it is; None if there is none. Raises OutsideFolder, OSError."""
+        """What is in a file, of a very long one how it begins; None if there is none. Raises OutsideFolder, OSError."""
         path = self.path(name)
-        return path.read_bytes() if path.is_file() else None
+        if not path.is_file():
+            return None
+        with path.open("rb") as file:
+            return file.read(LARGEST + 1)
 
     def read_text(self, name: str) -> str:
         """The text of a file. Raises as `read`; ValueError if it is no text."""
@@ -68,6 +71,8 @@ class Folder:
         path = self.path(name)
         if path.is_dir():
             raise OutsideFolder(f"{name!r} is a folder; give the file another name")
+        if path.exists() and not path.is_file():
+            raise OutsideFolder(f"{name!r} is a pipe or a device; give the file another name")
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)
         return path
