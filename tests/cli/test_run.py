@@ -286,6 +286,12 @@ def test_a_line_that_a_busy_module_turns_down_is_told_and_one_that_waits_for_idl
     assert json.loads(capsys.readouterr().out)["units"]["gs-c200"]["position"] == 100
 
 
+def test_what_the_script_says_in_the_first_instant_is_waited_for(capsys: pytest.CaptureFixture[str]) -> None:
+    cell = "examples/multipoint/cell.toml"
+    assert detent("run", cell, "--send", "@ idle", "--send", "u3:V1", "--send", "u7:V1") == 0
+    assert capsys.readouterr().out.split("> u3: V1\n")[1].startswith("< V300\n> u7: V1\n< V700\n")
+
+
 @pytest.mark.parametrize(
     ("tokens", "message"),
     [

@@ -3,6 +3,7 @@
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,6 +36,39 @@ def test_a_tuned_move_is_told_with_what_is_proved_of_it(capsys: pytest.CaptureFi
     assert any("damping 0.12 (assumed" in word for word in found["assumed"])
     assert not table.exists()
     assert "over it with --overwrite" in run(capsys, *words, code=2)
+
+
+@pytest.mark.parametrize(
+    ("model", "sets"),
+    [
+        ("gs-c200", "S20\nT50\nR100\n+60\n"),
+        ("dcb-274", "I 200\nV 1500\nK 10 10\nD 1\n+ 60\n"),
+        ("bs0710", "X\n8!\n100K\n800R\n1000P\n60G\n"),
+        ("supersigma", 'table = "0:1"\nshort = "off"\n'),
+    ],
+)
+def test_a_file_that_sets_nothing_is_told_before_the_work(
+    model: str,
+    sets: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def work(*_: Any, **__: Any) -> None:
+        raise ValueError("the work begins")
+
+    monkeypatch.setattr("detent.tuner.tune.tune", work)
+    source, into = tmp_path / "source", tmp_path / "into"
+    axis = ["--axis", "X"] if model == "bs0710" else []
+    words = ["tune", model, *RIG, *axis, "--moves", "60", "--from", str(source), "--into", str(into)]
+    source.write_text("; nothing\n")
+    assert "source: nothing there sets what" in run(capsys, *words, code=2)
+    source.write_text(sets)
+    assert "the work begins" in run(capsys, *words, code=2)
+    if model == "supersigma":
+        words = [word for word in words if word not in ("--from", str(source))]
+        assert "runs no programs" in run(capsys, *words, code=2)
+    assert not into.exists()
 
 
 @pytest.mark.parametrize(

@@ -86,6 +86,7 @@ class Course:
             until = cell.now + pause.length
             cell.run_to(until if self._until is None else min(until, max(self._until, cell.now)))
             return
+        cell.run_to(cell.now)  # what the script does in this instant comes first
         for _ in range(MOST_INSTANTS):
             if not self._busy() or not self._step():
                 return

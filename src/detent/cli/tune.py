@@ -14,7 +14,10 @@ from detent.cli.rig import Made, Options, RigOptions
 from detent.cli.tune_on import NO_MACHINE, MachineOptions
 
 if TYPE_CHECKING:
+    from detent.tuner.into import Changed
     from detent.tuner.search import Cancelled, Watch
+    from detent.tuner.spaces import Profile
+    from detent.tuner.task import Task
     from detent.tuner.tune import Tuned
 
 INTERRUPTED = 130
@@ -101,6 +104,7 @@ def tune(
     from detent.cli.rig import made, spread_of
     from detent.moves.law import winding_of
     from detent.tuner import tune as tuning
+    from detent.tuner.spaces import space
     from detent.tuner.task import Task, check_rig, moves_of
 
     try:
@@ -126,6 +130,9 @@ def tune(
         found = made(motor, rig, winding_of(_law(model, options, axis), _step(rig, model)))
         task = Task(model, check_rig(found.rig, found.motor.name), asked, options, axis, spread_of(vary), seed,
                     not no_corners, final=variants)  # fmt: skip
+        if into is not None:
+            first = space(task)
+            _changed(task, first.profile(first.hand), from_)  # what cannot be written is told before the work
         with _interruptible() as cancelled, _divided(workers, scheduler) as divided, _watch() as watch:
             do: Any = tuning.each_move if each_move else tuning.tune
             done = do(task, watch=watch, cancelled=cancelled, **divided)
@@ -285,21 +292,29 @@ def _map(tuned: "Tuned", paths: list[Path], watch: "Watch", cancelled: "Cancelle
                                  labels=found.labels, title=title, about=about + str(tuned.found.profile))  # fmt: skip
 
 
-def _into(tuned: "Tuned", into: Path, from_: Path | None) -> None:
+def _changed(task: "Task", profile: "Profile | None", from_: Path | None) -> "Changed":
+    """The text to write: a program, or that of a file with the settings in it. TunerError."""
     from detent.cli.rig import text_of
-    from detent.outputs.files import write_whole
-    from detent.tuner.into import program, put_into
+    from detent.tuner.into import Changed, program, put_into
     from detent.tuner.task import TunerError
 
+    if profile is None:
+        return Changed("", ())
     if from_ is None:
-        write_whole(into, program(tuned.task, tuned.found.profile).encode())
-        return
+        return Changed(program(task, profile), ())
     try:
-        changed = put_into(text_of(from_), tuned.found.profile, tuned.task.axis)
+        return put_into(text_of(from_), profile, task.axis)
     except TunerError as error:
         raise TunerError(f"{from_}: {error}") from None
+
+
+def _into(tuned: "Tuned", into: Path, from_: Path | None) -> None:
+    from detent.outputs.files import write_whole
+
+    changed = _changed(tuned.task, tuned.found.profile, from_)
     write_whole(into, changed.text.encode())
-    print(f"{into}: {', '.join(changed.replaced)}", file=sys.stderr)
+    if changed.replaced:
+        print(f"{into}: {', '.join(changed.replaced)}", file=sys.stderr)
 
 
 # -- what is printed ----------------------------------------------------------------------------------------
