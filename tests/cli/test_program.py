@@ -55,6 +55,24 @@ def test_a_download_replaces_nothing_unasked(tmp_path: Path, capsys: pytest.Capt
     assert kept.read_text() == new.read_text() != "mine"
 
 
+def test_a_module_that_is_left_in_programming_mode_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A GS-C200 leaves it by E alone, which starts the program (command description, E)."""
+    file = tmp_path / "blink.src"
+    file.write_text("A1\nD1\nC1\n")
+    with served("gs-c200") as service:
+        run("upload", "gs-c200", address(service), file, "--save")
+        told = capsys.readouterr().out.splitlines()
+        assert told[0] == "Stored 3 instructions, 6 bytes, read them back, and saved it"
+        assert told[1].startswith("What the gs-c200 is sent now is stored, too: it is in programming mode")
+        run("upload", "gs-c200", address(service), file, "--json")
+        assert "execute() (E)" in json.loads(capsys.readouterr().out)["left_open"]
+        file.write_text("; nothing\n")
+        run("send", "gs-c200", address(service), "E", "Z")
+        capsys.readouterr()
+        run("upload", "gs-c200", address(service), file)
+        assert "programming" not in capsys.readouterr().out, "there is nothing to be started"
+
+
 def test_a_program_that_is_saved_survives_in_the_eeprom(source: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with served("gs-c200s") as service:
         run("upload", "gs-c200s", address(service), source, "--save", "--json")

@@ -44,7 +44,7 @@ def upload(
     """Assemble a program and store it in a unit, verified.
 
     Labels and comments are fine. Nothing is sent unless all of it can be assembled. The program is not started. A
-    GS-C200 stays in programming mode.
+    GS-C200 stays in programming mode, which only E ends, by starting it; that is told.
 
     Parameters
     ----------
@@ -66,12 +66,15 @@ def upload(
         driver.write_program(lines)
         if save:
             driver.save()
+        left_open = getattr(found.driver, "left_open", "")
     facts = {"model": model, "port": port, "file": str(file), "instructions": len(lines), "bytes": assembly.used}
     if json:
-        print(json_text.dumps({**facts, "saved": save}))
+        print(json_text.dumps({**facts, "saved": save, **({"left_open": left_open} if left_open else {})}))
     else:
         kept = ", and saved it" if save else ""
         print(f"Stored {len(lines)} instructions, {assembly.used} bytes, read them back{kept}")
+        if left_open:
+            print(f"What the {model} is sent now is stored, too: {left_open}")
 
 
 def download(

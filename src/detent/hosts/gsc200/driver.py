@@ -161,6 +161,11 @@ class GsC200(Commands):
 
     # -- whole programs ----------------------------------------------------------------------------------
 
+    @property
+    def left_open(self) -> str:
+        """What an operation has left behind that whoever comes next must know; "": nothing."""
+        return LEAVING if self.programming and not self.signed else ""
+
     @operation
     def write_program(self, lines: Sequence[str]) -> Steps[None]:
         """Put a program into RAM, verified by Q; nothing is started and nothing is saved.

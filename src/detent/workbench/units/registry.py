@@ -229,7 +229,9 @@ class Units:
         if save:
             await unit.perform("saving the program", driver.save())
         kept = ", and saved" if save else ""
-        return f"{len(lines)} instructions, {assembly.used} bytes: stored, read back{kept}"
+        left_open = getattr(unit.shell.driver, "left_open", "")
+        open_ = f"; what it is sent now is stored, too: {left_open}" if left_open else ""
+        return f"{len(lines)} instructions, {assembly.used} bytes: stored, read back{kept}{open_}"
 
     # -- its backup --------------------------------------------------------------------------------------
 
