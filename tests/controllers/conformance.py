@@ -43,8 +43,8 @@ class Power(NamedTuple):
     on: bool
 
 
-Deed: TypeAlias = Received | PinTo | Power
-Schedule: TypeAlias = list[tuple[Ns, Deed]]
+Action: TypeAlias = Received | PinTo | Power
+Schedule: TypeAlias = list[tuple[Ns, Action]]
 """Inputs, each with the time that passes before it."""
 
 
@@ -66,7 +66,7 @@ class Candidate(NamedTuple):
 
 def schedules(candidate: Candidate) -> st.SearchStrategy[Schedule]:
     """Schedules of inputs for a candidate; the supply is switched on before the first."""
-    kinds: list[st.SearchStrategy[list[tuple[Ns, Deed]]]] = []
+    kinds: list[st.SearchStrategy[list[tuple[Ns, Action]]]] = []
     if candidate.frames is not None:
         frames = candidate.frames.map(lambda frame: [(gap, Received((char,))) for gap, char in frame])
         kinds += [frames, frames, frames]
@@ -78,15 +78,15 @@ def schedules(candidate: Candidate) -> st.SearchStrategy[Schedule]:
     return st.lists(st.tuples(candidate.gaps, st.one_of(piece, piece, piece, rare)), max_size=25).map(_flat)
 
 
-def _alone(deed: Deed) -> list[tuple[Ns, Deed]]:
-    return [(0, deed)]
+def _alone(action: Action) -> list[tuple[Ns, Action]]:
+    return [(0, action)]
 
 
-def _flat(pieces: list[tuple[Ns, list[tuple[Ns, Deed]]]]) -> Schedule:
+def _flat(pieces: list[tuple[Ns, list[tuple[Ns, Action]]]]) -> Schedule:
     schedule: Schedule = [(0, Power(True))]
-    for gap, deeds in pieces:
-        for index, (before, deed) in enumerate(deeds):
-            schedule.append((before + (0 if index else gap), deed))
+    for gap, actions in pieces:
+        for index, (before, action) in enumerate(actions):
+            schedule.append((before + (0 if index else gap), action))
     return schedule
 
 
@@ -143,9 +143,9 @@ class Run:
         most = 1_000 + self.candidate.most_per_second * (instant // SECOND + 1)
         assert self.deadlines <= most, f"{self.deadlines} deadlines in {instant} ns"
 
-    def do(self, deed: Deed) -> None:
+    def do(self, action: Action) -> None:
         """Let one thing reach the device, now."""
-        match deed:
+        match action:
             case Received(chars):
                 self.device.receive(self.candidate.port, chars, self.now)
             case PinTo(pin, level):
@@ -156,9 +156,9 @@ class Run:
 
     def play(self, schedule: Schedule, then: Ns = 2 * SECOND) -> list[Output]:
         """Play a whole schedule and let `then` pass; return all outputs."""
-        for gap, deed in schedule:
+        for gap, action in schedule:
             self.go_to(self.now + gap)
-            self.do(deed)
+            self.do(action)
         self.go_to(self.now + then)
         assert self.device.drain() == []
         return self.out
@@ -172,11 +172,11 @@ def play(candidate: Candidate, schedule: Schedule, slices: Sequence[float] = ())
 def together(schedule: Schedule) -> Schedule:
     """The same schedule with the characters of one instant in one call."""
     joined: Schedule = []
-    for gap, deed in schedule:
-        if gap == 0 and joined and isinstance(deed, Received) and isinstance(before := joined[-1][1], Received):
-            joined[-1] = (joined[-1][0], Received(before.chars + deed.chars))
+    for gap, action in schedule:
+        if gap == 0 and joined and isinstance(action, Received) and isinstance(before := joined[-1][1], Received):
+            joined[-1] = (joined[-1][0], Received(before.chars + action.chars))
         else:
-            joined.append((gap, deed))
+            joined.append((gap, action))
     return joined
 
 
@@ -186,12 +186,12 @@ def together(schedule: Schedule) -> Schedule:
 def output_does_not_depend_on_how_characters_are_sliced(candidate: Candidate, schedule: Schedule, cut: int) -> None:
     whole = together(schedule)
     apart: Schedule = []
-    for gap, deed in whole:
-        if isinstance(deed, Received) and len(deed.chars) > 1:
-            at = cut % len(deed.chars)
-            apart += [(gap, Received(deed.chars[:at])), (0, Received(deed.chars[at:]))]
+    for gap, action in whole:
+        if isinstance(action, Received) and len(action.chars) > 1:
+            at = cut % len(action.chars)
+            apart += [(gap, Received(action.chars[:at])), (0, Received(action.chars[at:]))]
         else:
-            apart.append((gap, deed))
+            apart.append((gap, action))
     expected = play(candidate, schedule)
     assert play(candidate, whole) == expected
     assert play(candidate, apart) == expected
@@ -207,9 +207,9 @@ def copies_go_on_alike(candidate: Candidate, schedule: Schedule, at: int, other:
     at %= len(schedule) + 1
     expected = play(candidate, schedule)
     run = Run(candidate, candidate.make())
-    for gap, deed in schedule[:at]:
+    for gap, action in schedule[:at]:
         run.go_to(run.now + gap)
-        run.do(deed)
+        run.do(action)
     twin, stranger = run.fork(), run.fork()
     stranger.play(other)  # whatever it does
     assert twin.play(schedule[at:]) == expected

@@ -109,7 +109,11 @@ def moving(candidate: Candidate, model: str) -> st.SearchStrategy[Schedule]:
 
     def begun(data: bytes, wait: Ns, rest: Schedule) -> Schedule:
         chars = [(25 * MS if n else 300 * MS, Received((Char(value),))) for n, value in enumerate(data)]
-        return [(0, Power(True)), *chars, *[(wait if n == 0 else gap, deed) for n, (gap, deed) in enumerate(rest[1:])]]
+        return [
+            (0, Power(True)),
+            *chars,
+            *[(wait if n == 0 else gap, action) for n, (gap, action) in enumerate(rest[1:])],
+        ]
 
     return st.builds(begun, starts(model), quiet, schedules(candidate))
 
@@ -120,9 +124,9 @@ def check(candidate: Candidate, data: st.DataObject) -> int:
     schedule = data.draw(schedules(candidate) | moving(candidate, model) | moving(candidate, model), label="schedule")
     run = Run(candidate, candidate.make())
     seen = 0
-    for gap, deed in schedule:
+    for gap, action in schedule:
         run.go_to(run.now + gap)
-        run.do(deed)
+        run.do(action)
         device: Controller = run.device  # type: ignore[assignment]
         for axis in device.axes:
             if not run.device.cuts(run.now, axis) and under_way(run, axis) is None:  # type: ignore[attr-defined]

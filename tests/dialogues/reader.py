@@ -195,11 +195,11 @@ class Player:
     def play(self, lines: list[tuple[int, str]]) -> None:
         for self.number, self.line in lines:
             word, _, rest = self.line.partition(" ")
-            deed = {">": self.say, "<": self.hear, ">>": self.say_raw, "<<": self.hear_raw}.get(word)
-            if deed is None:
-                deed = getattr(self, f"do_{word}", None)
-            assert deed is not None, f"line {self.number}: there is no such line: {self.line}"
-            deed(rest)
+            action = {">": self.say, "<": self.hear, ">>": self.say_raw, "<<": self.hear_raw}.get(word)
+            if action is None:
+                action = getattr(self, f"do_{word}", None)
+            assert action is not None, f"line {self.number}: there is no such line: {self.line}"
+            action(rest)
         self.number, self.line = lines[-1]
         self.nothing_left()
 

@@ -250,3 +250,23 @@ def test_a_line_that_echoes_is_told_by_whatever_call_comes_first(model: str) -> 
     for name in ("position", "moving", "stop"):
         with pytest.raises(BadAnswer, match="sends back what it is sent"):
             getattr(DRIVERS[model](Echoing()), name)()
+
+
+# -- a unit of another kind ------------------------------------------------------------------------------------
+
+KINDS = {"gs-c200": "gs-c200", "gs-c200s": "gs-c200"}  # the two speak alike
+
+
+@pytest.mark.parametrize("there", DRIVERS)
+@pytest.mark.parametrize("model", DRIVERS)
+def test_what_another_controller_says_is_no_position(model: str, there: str) -> None:
+    if KINDS.get(model, model) == KINDS.get(there, there):
+        return
+    made = cell(f'[units.unit]\nmodel = "{there}"\n')
+    made.run_to(1_000_000_000)
+    unit = DRIVERS[model](HostPort(made))
+    for _ in range(3):
+        with pytest.raises(DriverError):
+            unit.position()
+        with pytest.raises(DriverError):
+            unit.moving()

@@ -206,6 +206,22 @@ def test_what_is_left_behind_an_end_mark_is_a_program_only_where_a_jump_leads_to
     assert unit.left_over == "304-305"
 
 
+def test_a_unit_that_lost_its_supply_in_a_move_is_told_and_signed_on_again() -> None:
+    cell, unit = alone()
+    unit.move_by(20_000)
+    assert unit.moving()
+    cell.power("unit", False)
+    with pytest.raises(NoAnswer):
+        unit.moving()
+    cell.power("unit", True)
+    with pytest.raises(NoAnswer, match="was switched off and on, or reset: it is at 0"):
+        unit.wait()
+    unit.wait()
+    unit.move_by(10)
+    unit.wait()
+    assert unit.position() == 10
+
+
 def test_a_program_that_somebody_else_has_started_is_stopped_and_not_taken_for_a_dead_line() -> None:
     cell, unit = alone()
     unit.write_program(["M 1000", "L 2048 0"])

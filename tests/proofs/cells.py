@@ -150,9 +150,9 @@ class Hands:
 
     def act(self) -> None:
         """One thing, and some time behind it."""
-        deed = self._deed()
+        action = self._action()
         try:
-            deed()
+            action()
         except Oscillation:
             raise
         except (ValueError, KeyError, TypeError, RuntimeError) as refusal:
@@ -177,7 +177,7 @@ class Hands:
                 raise Enough
         cell.run_to(until)
 
-    def _deed(self) -> Callable[[], object]:
+    def _action(self) -> Callable[[], object]:
         cell, draw = self.cell, self._draw
         units = list(cell.wiring.names[: cell.wiring.units])
         unit = draw.choice(units)
@@ -227,11 +227,11 @@ class Hands:
         model = getattr(cell.parts[cell.unit(unit)], "model", "")
         if model not in BY_NAME:
             return lambda: None
-        said = [deed for deed in BY_NAME[model].deeds(draw) if isinstance(deed, Say | Raw)]
+        said = [action for action in BY_NAME[model].actions(draw) if isinstance(action, Say | Raw)]
         self._tally.frames += len(said)
         if draw.random() < 0.8:
-            return lambda: [cell.type(unit, deed.text) for deed in said if isinstance(deed, Say)]
-        data = b"".join(deed.data if isinstance(deed, Raw) else deed.text.encode() + b"\r" for deed in said)
+            return lambda: [cell.type(unit, action.text) for action in said if isinstance(action, Say)]
+        data = b"".join(action.data if isinstance(action, Raw) else action.text.encode() + b"\r" for action in said)
         chars = [Char(value, draw.random() < 0.95, draw.random() < 0.95) for value in data]
         chars += [Char(value) for value in draw.choices(CONTROL, k=draw.randint(0, 4))]
         line = cell.wiring.line_of[cell.unit(unit)]

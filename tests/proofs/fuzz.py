@@ -15,7 +15,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
-from tests.controllers.laws.bench import Deed, Power, Put, Raw, Say, Wait
+from tests.controllers.laws.bench import Action, Power, Put, Raw, Say, Wait
 from tests.proofs import cells, parsers, units
 from tests.proofs.tally import Tally
 
@@ -109,7 +109,7 @@ def keep(target: str, number: int, error: Exception) -> str:
     kind, _, name = target.partition(" ")
     case: dict[str, Any] = {"target": target, "number": number}
     if kind == "unit":
-        case["deeds"] = [_plain(deed) for deed in _smaller(units.case(name, number), error).deeds]
+        case["actions"] = [_plain(action) for action in _smaller(units.case(name, number), error).actions]
     elif kind == "read":
         case["data"] = parsers.data(name, number).hex()
     last = traceback.extract_tb(error.__traceback__)[-1]
@@ -125,26 +125,26 @@ def replay(path: Path) -> None:
     case = json.loads(path.read_text())
     kind, _, name = case["target"].partition(" ")
     if kind == "unit":
-        deeds = tuple(_KINDS[deed[0]](*(bytes.fromhex(v[1:]) if isinstance(v, str) and v[:1] == "#" else v
-                                        for v in deed[1:])) for deed in case["deeds"])  # fmt: skip
-        units.check(units.Case(name, case["number"], deeds), Tally())
+        actions = tuple(_KINDS[action[0]](*(bytes.fromhex(v[1:]) if isinstance(v, str) and v[:1] == "#" else v
+                                        for v in action[1:])) for action in case["actions"])  # fmt: skip
+        units.check(units.Case(name, case["number"], actions), Tally())
     elif kind == "cell":
         cells.check(case["number"], Tally())
     else:
         parsers.check_data(name, bytes.fromhex(case["data"]), Tally())
 
 
-def _plain(deed: Deed) -> list[Any]:
-    return [type(deed).__name__, *("#" + value.hex() if isinstance(value, bytes) else value for value in deed)]
+def _plain(action: Action) -> list[Any]:
+    return [type(action).__name__, *("#" + value.hex() if isinstance(value, bytes) else value for value in action)]
 
 
 def _smaller(case: units.Case, error: Exception) -> units.Case:
-    """The same failure with fewer deeds: halves and quarters and single ones are left out as long as it stays."""
-    tries, size = TRIES, max(len(case.deeds) // 2, 1)
+    """The same failure with fewer actions: halves and quarters and single ones are left out as long as it stays."""
+    tries, size = TRIES, max(len(case.actions) // 2, 1)
     while tries > 0:
         found = False
-        for place in range(0, len(case.deeds), size):
-            shorter = case._replace(deeds=case.deeds[:place] + case.deeds[place + size :])
+        for place in range(0, len(case.actions), size):
+            shorter = case._replace(actions=case.actions[:place] + case.actions[place + size :])
             tries -= 1
             try:
                 units.check(shorter, Tally())

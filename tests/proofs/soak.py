@@ -119,7 +119,7 @@ def _noise(cell: Cell, draw: Random) -> int:
     """A host says something, a hand is at a switch, a supply fails for a moment."""
     unit = draw.choice(cell.serial_units())
     model = getattr(cell.parts[cell.unit(unit)], "model", "")
-    said = [deed.text for deed in BY_NAME[model].deeds(draw) if isinstance(deed, Say)]
+    said = [action.text for action in BY_NAME[model].actions(draw) if isinstance(action, Say)]
     try:
         for text in said:
             cell.type(unit, text)

@@ -1,6 +1,6 @@
 """What a host, a hand and bad luck may do to one unit: mostly what the manual has, some of it damaged, some noise.
 
-The deeds are those of `tests.controllers.laws`, made from a number. Weight is on what broke things before: control
+The actions are those of `tests.controllers.laws`, made from a number. Weight is on what broke things before: control
 characters, frames that are nearly right, inputs that change in one instant, the supply, damaged images.
 """
 
@@ -9,7 +9,7 @@ from random import Random
 from typing import Final
 
 from tests.controllers.laws.adapter import Model
-from tests.controllers.laws.bench import Deed, Power, Put, Raw, Say, Wait
+from tests.controllers.laws.bench import Action, Power, Put, Raw, Say, Wait
 from tests.controllers.laws.histories import gap
 
 from detent.controllers.device import Controller
@@ -20,37 +20,39 @@ CONTROL: Final = bytes((*range(32), 127, 128, 255))
 INPUTS: Final = (PinKind.INPUT,)
 
 
-def stream(model: Model, device: Controller, draw: Random, frames: int, *, sound: bool) -> list[Deed]:
+def stream(model: Model, device: Controller, draw: Random, frames: int, *, sound: bool) -> list[Action]:
     """So many frames, about, with all that happens between them; a `sound` one has only what the manual has."""
-    deeds: list[Deed] = []
+    actions: list[Action] = []
     pins = [pin.name for pin in device.pins if pin.kind in INPUTS]
     told = 0
     while told < frames:
-        made = list(model.deeds(draw)) if sound or draw.random() < 0.6 else _rough(model, device, draw, pins)
-        told += sum(isinstance(deed, Say | Raw) for deed in made)
-        deeds += made
+        made = list(model.actions(draw)) if sound or draw.random() < 0.6 else _rough(model, device, draw, pins)
+        told += sum(isinstance(action, Say | Raw) for action in made)
+        actions += made
         if draw.random() < 0.7:
-            deeds.append(Wait(gap(draw)))
-    return deeds
+            actions.append(Wait(gap(draw)))
+    return actions
 
 
-def _rough(model: Model, device: Controller, draw: Random, pins: Sequence[str]) -> list[Deed]:
+def _rough(model: Model, device: Controller, draw: Random, pins: Sequence[str]) -> list[Action]:
     match draw.randrange(10):
         case 0 | 1 | 2 | 3:
-            return [_damaged(deed, device, draw) if isinstance(deed, Say) else deed for deed in model.deeds(draw)]
+            return [
+                _damaged(action, device, draw) if isinstance(action, Say) else action for action in model.actions(draw)
+            ]
         case 4:
             return [Raw(bytes(draw.choices(CONTROL, k=draw.randint(1, 6))))]
         case 5:
-            said = [deed for deed in model.deeds(draw) if isinstance(deed, Say)]
-            return [deed for deed in said for _ in range(draw.choice((2, 3, 40)))]
+            said = [action for action in model.actions(draw) if isinstance(action, Say)]
+            return [action for action in said for _ in range(draw.choice((2, 3, 40)))]
         case 6:
             return [Raw(draw.randbytes(draw.randint(1, 20)), draw.randrange(-1, 3))]
         case 7:
             return [Put(draw.choice(pins), draw.choice((LOW, HIGH))) for _ in range(draw.randint(1, 12))]
         case 8:  # all of an answer is under way, or nothing is
-            return [*model.deeds(draw), Power(draw.random() < 0.3), Wait(draw.choice((0, 0, 1, MS))), Power(True)]
+            return [*model.actions(draw), Power(draw.random() < 0.3), Wait(draw.choice((0, 0, 1, MS))), Power(True)]
     held = draw.sample(pins, min(2, len(pins)))
-    return [*(Put(pin, LOW) for pin in held), *model.deeds(draw), *(Put(pin, HIGH) for pin in held)]
+    return [*(Put(pin, LOW) for pin in held), *model.actions(draw), *(Put(pin, HIGH) for pin in held)]
 
 
 def _damaged(said: Say, device: Controller, draw: Random) -> Raw:

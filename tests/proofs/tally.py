@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 
-from tests.controllers.laws.bench import Deed, Raw, Say
+from tests.controllers.laws.bench import Action, Raw, Say
 
 
 @dataclass
@@ -27,6 +27,6 @@ class Tally:
             setattr(self, one.name, getattr(self, one.name) + getattr(other, one.name))
 
 
-def frames_of(deeds: Iterable[Deed]) -> int:
+def frames_of(actions: Iterable[Action]) -> int:
     """How many of them are frames."""
-    return sum(isinstance(deed, Say | Raw) for deed in deeds)
+    return sum(isinstance(action, Say | Raw) for action in actions)

@@ -51,7 +51,7 @@ def test_a_case_that_fails_is_made_small_and_fails_again(tmp_path: Path, monkeyp
 
     def breaks(case: fuzz.units.Case, tally: fuzz.Tally) -> None:
         check(case, tally)
-        if any(getattr(deed, "text", "").startswith("S") for deed in case.deeds):
+        if any(getattr(action, "text", "").startswith("S") for action in case.actions):
             raise ZeroDivisionError("S breaks it")
 
     monkeypatch.setattr(fuzz.units, "check", breaks)

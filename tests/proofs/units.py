@@ -12,7 +12,7 @@ from random import Random
 from typing import Final, NamedTuple
 
 from tests.controllers.laws.adapter import Model
-from tests.controllers.laws.bench import Bench, Contact, Deed, Power
+from tests.controllers.laws.bench import Action, Bench, Contact, Power
 from tests.controllers.laws.models import MODELS
 from tests.proofs.streams import damaged_image, stream
 from tests.proofs.tally import Tally, frames_of
@@ -45,7 +45,7 @@ class Strict(Bench):
         deadline = self.device.next_deadline()
         assert deadline is None or deadline >= self.now, f"the deadline {deadline} is over at {self.now}"
         self.events += 1
-        most = 100 * len(self.deeds) + 100_000 + MOST_DEADLINES * (self.now // SECOND + 1)
+        most = 100 * len(self.actions) + 100_000 + MOST_DEADLINES * (self.now // SECOND + 1)
         assert self.events <= most, f"{self.events} events in {self.now} ns"
 
     def check(self) -> None:
@@ -65,7 +65,7 @@ class Strict(Bench):
         other = copy.copy(self)
         other.device = copy.deepcopy(self.device)
         other.travels = copy.deepcopy(self.travels)
-        other.held, other.deeds, other.out = dict(self.held), list(self.deeds), list(self.out)
+        other.held, other.actions, other.out = dict(self.held), list(self.actions), list(self.out)
         other._edges, other._levels = list(self._edges), dict(self._levels)
         return other
 
@@ -75,7 +75,7 @@ class Case(NamedTuple):
 
     model: str
     number: int
-    deeds: tuple[Deed, ...]
+    actions: tuple[Action, ...]
     sound: bool = False
 
 
@@ -106,26 +106,26 @@ def check(case: Case, tally: Tally) -> None:
         except ImageError:
             tally.refused += 1
     bench.play((Power(True), *model.ready()))
-    cut = draw.randrange(len(case.deeds) + 1) if case.number % 4 == 1 else len(case.deeds)
-    bench.play(case.deeds[:cut])
-    if cut < len(case.deeds):
-        _goes_on_alike(bench, case.deeds[cut:])
+    cut = draw.randrange(len(case.actions) + 1) if case.number % 4 == 1 else len(case.actions)
+    bench.play(case.actions[:cut])
+    if cut < len(case.actions):
+        _goes_on_alike(bench, case.actions[cut:])
         tally.copies += 1
     elif case.sound:
         tally.stops += _leads_to_rest(model, bench, draw)
     bench.check()
-    tally.frames += frames_of(case.deeds)
+    tally.frames += frames_of(case.actions)
     tally.events += bench.events
     tally.pulses += sum(bench.counts().values())
     if case.number % 20 == 3:
         again, _ = made(model, case.number)
         again.play((Power(True), *model.ready()))
-        again.play(case.deeds)
+        again.play(case.actions)
         assert _told(again.out) == _told(bench.out), "the same again is not the same"
         tally.replays += 1
 
 
-def _goes_on_alike(bench: Strict, rest: Sequence[Deed]) -> None:
+def _goes_on_alike(bench: Strict, rest: Sequence[Action]) -> None:
     twin = bench.twin()
     bench.play(rest)
     bench.go_to(bench.now + SECOND)
@@ -147,7 +147,7 @@ def _leads_to_rest(model: Model, bench: Strict, draw: Random) -> bool:
     if not stop.applies(bench):
         return False
     allowed, axes, begun = stop.allowed(bench), stop.axes(bench), bench.now
-    bench.play(stop.deeds(bench))
+    bench.play(stop.actions(bench))
     bench.go_to(max(begun + allowed, bench.now))
     given = {axis: bench.travels[axis].count(bench.now) for axis in axes}
     assert not any(bench.travels[axis].moving for axis in axes), f"{stop.name} at {begun}: it moves {allowed} ns later"

@@ -57,17 +57,17 @@ def test_many_descriptors_are_waited_for_as_few_are(many: None, seed: int) -> No
     random = Random(seed)
     few, large = pairs(6, large=False), pairs(6, large=True)
     for number in range(6):
-        deed = random.choice(("nothing", "said", "gone", "full", "said and gone"))
+        action = random.choice(("nothing", "said", "gone", "full", "said and gone"))
         for mine, other in (few[number], large[number]):
-            if "said" in deed:
+            if "said" in action:
                 os.write(other, b"x")
-            if deed == "full":
+            if action == "full":
                 try:
                     while True:
                         os.write(mine, b"x" * 65536)
                 except BlockingIOError:
                     pass
-            if "gone" in deed:
+            if "gone" in action:
                 with socket.socket(fileno=os.dup(other)) as shut:
                     shut.shutdown(socket.SHUT_RDWR)
     reading = [number for number in range(6) if random.random() < 0.8]

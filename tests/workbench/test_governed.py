@@ -103,7 +103,7 @@ def test_what_waits_can_be_cleared() -> None:
     played(scene)
 
 
-def test_deeds_of_a_program_are_marked_and_can_be_gone_back_over() -> None:
+def test_actions_of_a_program_are_marked_and_can_be_gone_back_over() -> None:
     async def scene(bench: Bench) -> None:
         await ask(bench, "step", time="10 ms")
         await ask(bench, "set", pin="UI1", level=0)

@@ -24,6 +24,7 @@ ANSWER: Final = 3  # bytes
 NO_FLAG: Final = 0xE0  # bits of the third that are always 0
 PATIENCE: Final = 0.5  # seconds for the answer to status, beyond what its bytes take
 SILENCE: Final = 0.11  # a drive counts 0.1 s, by a clock of its own
+MORE: Final = 0.02  # seconds that another controller may take for the rest of what it says
 TRIES: Final = 2
 STOPS: Final = 4  # times that a stop is said before it is given up
 
@@ -81,9 +82,10 @@ class BusDriver(Driver):
 
         A late answer to an earlier question is not taken for it.
         """
-        data = message(drive, STATUS)
+        data, more = message(drive, STATUS), b""
         if not self._in_step:
             yield from self._silent()
+            more = b"?"  # who is there is not known yet
         for left in reversed(range(TRIES)):
             yield Clear()
             answer = yield Ask(data, length(ANSWER), self._patience)
@@ -93,15 +95,19 @@ class BusDriver(Driver):
             if echoed:
                 self._in_step = False
                 raise BadAnswer(f"drive {drive}", ECHOES, Spoken(data, answer.data))
-            if answer.whole and not answer.data[2] & NO_FLAG:
+            if answer.whole and more:
+                more = (yield Ask(b"", length(1), MORE)).data
+            if answer.whole and not answer.data[2] & NO_FLAG and not more:
                 self._at = answer.at
                 return Report(int.from_bytes(answer.data[:2], "big"), answer.data[2])
             self._in_step = False
             if left:
                 yield from self._silent()
+                more = b"?"
         spoken = Spoken(data, answer.data)
         if answer.whole:
-            raise BadAnswer(f"drive {drive}", "its answer to status was damaged", spoken)
+            what = "says more than a drive does" if more else "its answer to status was damaged"
+            raise BadAnswer(f"drive {drive}", what, spoken._replace(received=answer.data + more))
         what = "does not finish its answer" if answer.data else "does not answer status"
         raise NoAnswer(f"drive {drive}", f"{what} within {self._patience:g} s", spoken)
 

@@ -31,7 +31,7 @@ SWITCHES = ("LIMIT-A", "LIMIT-B", "HOME", "SS", "GO", "JOG1", "JOG2", "JOG-S", "
 SOON = (0, 0, 1, 200_000, 1 * MS, 3 * MS, 8 * MS, 20 * MS, 60 * MS, 150 * MS, 400 * MS, 2_500 * MS)
 
 
-class Deed(NamedTuple):
+class Action(NamedTuple):
     """Something that somebody does, so long after the thing before."""
 
     wait: Ns
@@ -39,20 +39,20 @@ class Deed(NamedTuple):
     level: int | None = None
 
 
-def deeds(*more: str, switches: tuple[str, ...] = SWITCHES) -> st.SearchStrategy[Deed]:
+def actions(*more: str, switches: tuple[str, ...] = SWITCHES) -> st.SearchStrategy[Action]:
     """Command lines, programs and levels."""
     line = st.sampled_from([*MOVES, *MOVES, *SETTINGS, *more, "G", "G"]).map(lambda text: text + "\r")
     wait = st.sampled_from(SOON)
     return st.one_of(
-        st.builds(Deed, wait, line),
-        st.builds(Deed, wait, line),
-        st.builds(Deed, wait, st.sampled_from(switches), st.sampled_from((0, 1))),
+        st.builds(Action, wait, line),
+        st.builds(Action, wait, line),
+        st.builds(Action, wait, st.sampled_from(switches), st.sampled_from((0, 1))),
     )
 
 
-def histories(most: int = 12) -> st.SearchStrategy[tuple[tuple[str, ...], list[Deed]]]:
+def histories(most: int = 12) -> st.SearchStrategy[tuple[tuple[str, ...], list[Action]]]:
     """A stored program, and what happens then."""
-    return st.tuples(st.sampled_from(PROGRAMS), st.lists(deeds(), max_size=most))
+    return st.tuples(st.sampled_from(PROGRAMS), st.lists(actions(), max_size=most))
 
 
 def begun(program: tuple[str, ...]) -> Bench:
@@ -69,13 +69,13 @@ def begun(program: tuple[str, ...]) -> Bench:
 _BEGUN: dict[str, Bench] = {}
 
 
-def do(bench: Bench, deed: Deed) -> None:
+def do(bench: Bench, action: Action) -> None:
     """Let time pass, then do it."""
-    bench.run_to(bench.now + deed.wait)
-    if deed.level is None:
-        bench.say(deed.what)
+    bench.run_to(bench.now + action.wait)
+    if action.level is None:
+        bench.say(action.what)
     else:
-        bench.pin(deed.what, deed.level)
+        bench.pin(action.what, action.level)
 
 
 def shaft(bench: Bench) -> int:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controllers.dcb274 import histories
-from tests.controllers.dcb274.histories import Deed, begun, do, motions, shaft
+from tests.controllers.dcb274.histories import Action, begun, do, motions, shaft
 
 from detent.controllers.dcb274.desk import Stage
 from detent.ticks import MS, SECOND
@@ -17,10 +17,10 @@ MANY = settings(max_examples=10_000, deadline=None)
 
 def a_stop_leads_to_rest(data: st.DataObject) -> None:
     """Pages 28 and 33: within the time of the ramp; nothing that was pending moves afterwards."""
-    program, deeds = data.draw(histories.histories())
+    program, actions = data.draw(histories.histories())
     bench = begun(program)
-    for deed in deeds:
-        do(bench, deed)
+    for action in actions:
+        do(bench, action)
     bench.run_to(bench.now + data.draw(st.sampled_from(histories.SOON)))
     how = data.draw(st.sampled_from(histories.stops(bench)))
     longest = histories.longest_stop(bench)
@@ -35,18 +35,18 @@ def a_stop_leads_to_rest(data: st.DataObject) -> None:
 
 def a_jog_that_is_released_leads_to_rest(data: st.DataObject) -> None:
     """Page 28: jog is a special case of constant velocity; it ramps to rest."""
-    program, deeds = data.draw(histories.histories(6))
+    program, actions = data.draw(histories.histories(6))
     bench = begun(program)
-    for deed in deeds:
-        do(bench, deed)
+    for action in actions:
+        do(bench, action)
     for pin, level in (("GO", 1), ("JOG1", 1), ("JOG2", 1), ("SS", 1), ("LIMIT-A", 1), ("LIMIT-B", 1)):
         bench.pin(pin, level)
     bench.say("\x1bl 0\r")
     bench.run_to(bench.now + 100 * MS)
     bench.say(data.draw(st.sampled_from(["w 10\r", "B 10 40\r", "B 200 250\r", "B 0 3\r"])))
     bench.run_to(bench.now + SECOND)
-    for deed in data.draw(st.lists(histories.deeds(switches=("JOG1", "JOG2", "JOG-S")), max_size=6)):
-        do(bench, Deed(deed.wait, deed.what, deed.level if deed.level is not None else None))
+    for action in data.draw(st.lists(histories.actions(switches=("JOG1", "JOG2", "JOG-S")), max_size=6)):
+        do(bench, Action(action.wait, action.what, action.level if action.level is not None else None))
     if not bench.unit._motion.jogging:
         return
     longest = histories.longest_stop(bench)
@@ -58,26 +58,26 @@ def a_jog_that_is_released_leads_to_rest(data: st.DataObject) -> None:
 
 def a_closed_limit_is_never_passed(data: st.DataObject) -> None:
     """Pages 7 and 46: not by a step, or with flag 32 by no more than the ramp; whatever is done meanwhile."""
-    program, deeds = data.draw(histories.histories(8))
+    program, actions = data.draw(histories.histories(8))
     bench = begun(program)
     gentle = data.draw(st.booleans())
     bench.say("l 32\r" if gentle else "l 0\r")
     bench.run_to(bench.now + 10 * MS)
-    for deed in deeds:
-        if not deed.what.startswith("l ") and deed.what != "C 0\r":
-            do(bench, deed)
+    for action in actions:
+        if not action.what.startswith("l ") and action.what != "C 0\r":
+            do(bench, action)
     bench.run_to(bench.now + data.draw(st.sampled_from(histories.SOON)))
     pin, direction = data.draw(st.sampled_from([("LIMIT-A", 1), ("LIMIT-B", -1)]))
     bench.pin(pin, 0)
     at, registers = shaft(bench), bench.unit._settings
     rungs = len(histories.ladder(registers.initial, registers.divide).periods)
     over = registers.ramp[1] * rungs + 1 if registers.flags & 32 else 0
-    for deed in data.draw(st.lists(histories.deeds("\x1b", "R 5000", "R -5000"), max_size=8)):
-        if deed.what in ("LIMIT-A", "LIMIT-B", "C 0\r") or deed.what.startswith("l "):
+    for action in data.draw(st.lists(histories.actions("\x1b", "R 5000", "R -5000"), max_size=8)):
+        if action.what in ("LIMIT-A", "LIMIT-B", "C 0\r") or action.what.startswith("l "):
             continue
-        if over and deed.what[:2] in ("K ", "I ", "D "):
+        if over and action.what[:2] in ("K ", "I ", "D "):
             continue
-        do(bench, deed)
+        do(bench, action)
         assert (shaft(bench) - at) * direction <= over
     bench.run_to(bench.now + 2 * SECOND)
     assert (shaft(bench) - at) * direction <= over
@@ -85,10 +85,10 @@ def a_closed_limit_is_never_passed(data: st.DataObject) -> None:
 
 def redefining_the_position_moves_nothing(data: st.DataObject) -> None:
     """Page 47: "may be changed without affecting the distance of travel in process"."""
-    program, deeds = data.draw(histories.histories(8))
+    program, actions = data.draw(histories.histories(8))
     bench = begun(program)
-    for deed in deeds:
-        do(bench, deed)
+    for action in actions:
+        do(bench, action)
     unit = bench.unit
     if unit._desk.stage is not Stage.FREE or unit._desk.programming or unit._running.active or unit._motion.jogging:
         return

@@ -1,6 +1,6 @@
 """What may happen to a board, as histories: what is typed, switches, keys, power; and the board that lives them.
 
-Everything reaches the device itself, without a line, so that a history costs little. Deeds are typed text, `(pin,
+Everything reaches the device itself, without a line, so that a history costs little. Actions are typed text, `(pin,
 level)` and `"off and on"`; between two of them some time passes, often none.
 """
 
@@ -15,8 +15,8 @@ from detent.controllers.genstepper.firmware import GenStepper
 from detent.ticks import MS, SECOND, Ns
 from detent.uart import Char
 
-Deed: TypeAlias = str | tuple[str, int]
-History: TypeAlias = list[tuple[Deed, Ns]]
+Action: TypeAlias = str | tuple[str, int]
+History: TypeAlias = list[tuple[Action, Ns]]
 
 OFF_AND_ON = "off and on"
 LIMITS = ("LX-", "LX+", "LY-", "LY+")
@@ -99,19 +99,19 @@ class Life:
         self.board.advance(self.now)
         self.out += self.board.drain()
 
-    def do(self, deed: Deed) -> None:
-        if deed == OFF_AND_ON:
+    def do(self, action: Action) -> None:
+        if action == OFF_AND_ON:
             self.board.power(False, self.now)
             self.board.power(True, self.now)
-        elif isinstance(deed, str):
-            self.board.receive("SI", [Char(ord(letter)) for letter in deed], self.now)
+        elif isinstance(action, str):
+            self.board.receive("SI", [Char(ord(letter)) for letter in action], self.now)
         else:
-            self.board.set_pin(*deed, self.now)
+            self.board.set_pin(*action, self.now)
         self.out += self.board.drain()
 
     def live(self, history: History) -> None:
-        for deed, wait in history:
-            self.do(deed)
+        for action, wait in history:
+            self.do(action)
             self.run(wait)
 
     def steps(self, axis: str) -> list[tuple[Ns, int]]:

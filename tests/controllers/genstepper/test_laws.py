@@ -101,7 +101,7 @@ class Watch:
         return sum(direction == way for _, direction in self.life.steps(limit[1]))
 
     def look(self, before: dict[str, tuple[bool, int, int, int, int]]) -> None:
-        """After a deed: `before` it each motor was at rest or not, with direction, speed, P and K."""
+        """After an action: `before` it each motor was at rest or not, with direction, speed, P and K."""
         closed = self.closed()
         for limit in set(self.allowed) - closed:
             del self.allowed[limit]
@@ -131,8 +131,8 @@ def seen(life: Life) -> dict[str, tuple[bool, int, int, int, int]]:
 def a_closed_limit_is_never_passed(history, hard):
     life = fresh(hard)
     watch = Watch(life)
-    for deed, wait in history:
-        parts = list(deed) if isinstance(deed, str) and deed != OFF_AND_ON else [deed]
+    for action, wait in history:
+        parts = list(action) if isinstance(action, str) and action != OFF_AND_ON else [action]
         for part in parts:
             before = seen(life)
             life.do(part)
@@ -207,8 +207,8 @@ def a_held_key_wins(history, axis, held):
     life.do("B62500P")
     for sign in "+-":
         life.do((axis + sign, 0 if sign in held else 1))
-    life.live(history_of_typing := [(deed, wait) for deed, wait in history if isinstance(deed, str)
-                                    and deed[-1] not in "ETKPR!" and deed != OFF_AND_ON])  # fmt: skip
+    life.live(history_of_typing := [(action, wait) for action, wait in history if isinstance(action, str)
+                                    and action[-1] not in "ETKPR!" and action != OFF_AND_ON])  # fmt: skip
     life.run(3 * SECOND)
     asked = keys(life.board._inputs, axis)
     motor = life.motor(axis)

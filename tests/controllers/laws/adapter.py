@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from random import Random
 from typing import Any, NamedTuple, Protocol
 
-from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Store, Wait
+from tests.controllers.laws.bench import Action, Bench, Contact, Power, Store, Wait
 from tests.controllers.laws.histories import History, gap
 from tests.controllers.laws.motors import motor
 
@@ -20,14 +20,14 @@ from detent.ticks import Ns
 class Stop(NamedTuple):
     """One way to stop, and the page of the manual that has it.
 
-    `deeds` are what is done. `applies` says whether it can be used now (only a key that is held can be let go),
+    `actions` are what is done. `applies` says whether it can be used now (only a key that is held can be let go),
     `allowed` how long the manual lets it take from now on; both are asked before. `axes`: which ones it stops.
     `holding`: keys stay held until then; for all others they are let go before.
     """
 
     name: str
     page: str
-    deeds: Callable[[Bench], Sequence[Deed]]
+    actions: Callable[[Bench], Sequence[Action]]
     allowed: Callable[[Bench], Ns]
     applies: Callable[[Bench], bool] = lambda bench: True
     axes: Callable[[Bench], Sequence[str]] = lambda bench: tuple(bench.travels)
@@ -61,8 +61,8 @@ class Redefinition(NamedTuple):
 
     name: str
     page: str
-    deeds: Sequence[Deed]
-    neutral: Sequence[Deed]
+    actions: Sequence[Action]
+    neutral: Sequence[Action]
     value: int
     axes: Sequence[str]
     applies: Callable[[Bench], bool] = lambda bench: True
@@ -84,22 +84,22 @@ class Model(Protocol):
     def make(self, options: Mapping[str, Any]) -> Controller:
         """A new one."""
 
-    def ready(self) -> Sequence[Deed]:
+    def ready(self) -> Sequence[Action]:
         """What it takes after its supply is switched on."""
 
     def contacts(self, draw: Random) -> tuple[Contact, ...]:
         """Switches on its axes, momentary ones too."""
 
-    def deeds(self, draw: Random) -> Sequence[Deed]:
+    def actions(self, draw: Random) -> Sequence[Action]:
         """What may happen: moves in each of its ways, settings, questions, keys, momentary contacts, noise, power."""
 
-    def meanwhile(self, draw: Random) -> Sequence[Deed]:
+    def meanwhile(self, draw: Random) -> Sequence[Action]:
         """What may happen behind a stop without beginning a move, or changing a ramp."""
 
     def phase(self, bench: Bench, axis: str) -> str:
         """The phase in which an axis is."""
 
-    def let_go(self, bench: Bench) -> Sequence[Deed]:
+    def let_go(self, bench: Bench) -> Sequence[Action]:
         """Let go whatever the manual lets set a motion off again by itself: keys that are held."""
 
     def stops(self) -> Sequence[Stop]:
@@ -118,9 +118,9 @@ class Model(Protocol):
         """A way in which it redefines a position; None if it has none."""
 
     def redefines(self, bench: Bench) -> bool:
-        """Whether the last deed, or what it set off, may give the position another number."""
+        """Whether the last action, or what it set off, may give the position another number."""
 
-    def onward(self, draw: Random) -> Sequence[Deed]:
+    def onward(self, draw: Random) -> Sequence[Action]:
         """What does not depend on the number that a position has: relative moves, slews, stops, keys."""
 
     def told(self, bench: Bench, axis: str) -> int | None:
@@ -145,13 +145,13 @@ def ready(model: Model, history: History) -> Bench:
 
 def history(model: Model, draw: Random, most: int = 12) -> History:
     """A history of a model."""
-    deeds: list[Deed] = []
+    actions: list[Action] = []
     for _ in range(draw.randint(1, most)):
-        deeds += (*model.deeds(draw), Wait(gap(draw)))
+        actions += (*model.actions(draw), Wait(gap(draw)))
     if draw.random() < 0.05:
-        place = draw.randrange(len(deeds))
-        deeds[place:place] = [Store(False), *([Wait(gap(draw)), Store(True)] if draw.random() < 0.5 else [])]
-    made = History(model.options(draw), model.contacts(draw), tuple(deeds))
+        place = draw.randrange(len(actions))
+        actions[place:place] = [Store(False), *([Wait(gap(draw)), Store(True)] if draw.random() < 0.5 else [])]
+    made = History(model.options(draw), model.contacts(draw), tuple(actions))
     if draw.random() >= WITH_MOTOR:
         return made
     return made._replace(motor=draw.choice(model.axes))

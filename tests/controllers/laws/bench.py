@@ -53,7 +53,7 @@ class Store(NamedTuple):
     works: bool
 
 
-Deed: TypeAlias = Say | Raw | Put | Power | Wait | Store
+Action: TypeAlias = Say | Raw | Put | Power | Wait | Store
 
 
 class Contact(NamedTuple):
@@ -170,7 +170,7 @@ class Bench:
         self.now: Ns = 0
         self.travels = {axis: Travel() for axis in device.axes}
         self.held: dict[str, Level] = {}  # inputs that somebody holds
-        self.deeds: list[Deed] = []  # what was done so far
+        self.actions: list[Action] = []  # what was done so far
         self.out: list[Output] = []
         self.watches: list[Watch] = []
         self._edges: list[tuple[Ns, Contact]] = []
@@ -181,16 +181,16 @@ class Bench:
 
     # -- doing -------------------------------------------------------------------------------------------
 
-    def play(self, deeds: Iterable[Deed]) -> None:
+    def play(self, actions: Iterable[Action]) -> None:
         """Do one thing after another."""
-        for deed in deeds:
-            self.do(deed)
+        for action in actions:
+            self.do(action)
 
-    def do(self, deed: Deed) -> None:
+    def do(self, action: Action) -> None:
         """Do one thing, now."""
-        self.deeds.append(deed)
+        self.actions.append(action)
         self._about_to()
-        match deed:
+        match action:
             case Wait(time):
                 self.go_to(self.now + time)
                 return

@@ -6,7 +6,7 @@ from random import Random
 from typing import Any
 
 from tests.controllers.laws.adapter import Limit, Redefinition, Stop
-from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
+from tests.controllers.laws.bench import Action, Bench, Contact, Power, Put, Raw, Say, Wait
 
 from detent.controllers.dcb274.firmware import Dcb274
 from detent.pins import HIGH, LOW, Level
@@ -66,8 +66,8 @@ def ramp(rate: float, steps: int, initial: int, divide: int) -> tuple[int, Ns]:
 
 def fastest(bench: Bench) -> float:
     """The largest rate that anything can have asked for so far."""
-    typed = [abs(float(deed.text.split()[1])) for deed in bench.deeds
-             if isinstance(deed, Say) and deed.text[:2] in ("M ", "F ", "V ", "I ")]  # fmt: skip
+    typed = [abs(float(action.text.split()[1])) for action in bench.actions
+             if isinstance(action, Say) and action.text[:2] in ("M ", "F ", "V ", "I ")]  # fmt: skip
     return max(10_500, *typed, 200 * 30 * 2 * 1.1) / registers(bench)[4]
 
 
@@ -75,7 +75,7 @@ def soft(bench: Bench) -> Ns:
     """Down the ramp from the rate that the axis has when the character has been taken; the pulse on its way before."""
     travel = bench.travels[""]
     _, down, initial, _, divide = registers(bench)
-    match next((deed.text.split() for deed in reversed(bench.deeds) if isinstance(deed, Say)), []):
+    match next((action.text.split() for action in reversed(bench.actions) if isinstance(action, Say)), []):
         case ["I", value]:  # it may be in hand still
             initial = min(initial, int(value))
         case ["K", _, value]:
@@ -132,7 +132,7 @@ class Axis:
         straps = {"PARTY": 1} if options.get("party") else None
         return Dcb274(straps, line_timing=False)
 
-    def ready(self) -> Sequence[Deed]:
+    def ready(self) -> Sequence[Action]:
         return (Raw(b" \n"),)  # signs on; on a party line a line begins behind LF
 
     def contacts(self, draw: Random) -> tuple[Contact, ...]:
@@ -148,7 +148,7 @@ class Axis:
             found.append(Contact("HOME", "", at, at + draw.choice((2, 40, 10**9))))
         return tuple(found)
 
-    def deeds(self, draw: Random) -> Sequence[Deed]:
+    def actions(self, draw: Random) -> Sequence[Action]:
         match draw.randrange(16):
             case 0 | 1 | 2 | 3 | 4:
                 return [Say(draw.choice(MOVES))]
@@ -158,7 +158,7 @@ class Axis:
                 return [Say(draw.choice(("@", "M 0", "W 0", "W 30", "l 32", "l 0", "l 0", "l 1")))]
             case 8 | 9:
                 lines = draw.choice(PROGRAMS)
-                stored = [deed for line in lines for deed in (Say(line), Wait(20 * MS))]
+                stored = [action for line in lines for action in (Say(line), Wait(20 * MS))]
                 return [*stored, Say("G 128" if lines[0] == "P 128" else "G 0")]
             case 10 | 11:
                 return [Put(draw.choice(KEYS), draw.choice((LOW, LOW, HIGH)))]
@@ -169,7 +169,7 @@ class Axis:
                 return self.meanwhile(draw)
         return self._rare(draw)
 
-    def _rare(self, draw: Random) -> Sequence[Deed]:
+    def _rare(self, draw: Random) -> Sequence[Action]:
         match draw.randrange(8):
             case 0:
                 return [Power(False), Wait(1 * MS), Power(True), *self.ready()]
@@ -186,10 +186,10 @@ class Axis:
             case 2:
                 return [Raw(b"\x1b")]
             case 3:
-                return [deed for _ in range(3) for deed in (Put("STEP", LOW), Wait(90 * US), Put("STEP", HIGH))]
+                return [action for _ in range(3) for action in (Put("STEP", LOW), Wait(90 * US), Put("STEP", HIGH))]
         return [Raw(bytes(draw.choices(b"xX+9 #;,@\x80\xff", k=3)) + b"\r\n", draw.randrange(-1, 3))]
 
-    def meanwhile(self, draw: Random) -> Sequence[Deed]:
+    def meanwhile(self, draw: Random) -> Sequence[Action]:
         return [Say(draw.choice(QUESTIONS))]
 
     def phase(self, bench: Bench, axis: str) -> str:
@@ -215,7 +215,7 @@ class Axis:
         then = train.time_of(far) - train.time_of(far - 1) if far > given + 1 else now
         return "at speed" if 0.98 < now / (then or 1) < 1.02 else "slowing" if then > now else "speeding up"
 
-    def let_go(self, bench: Bench) -> Sequence[Deed]:
+    def let_go(self, bench: Bench) -> Sequence[Action]:
         return [Put(key, HIGH) for key in KEYS if bench.level(key) == LOW]
 
     def stops(self) -> Sequence[Stop]:
@@ -256,19 +256,19 @@ class Axis:
                             and not bench.device._motion.jogging)  # type: ignore[attr-defined]  # fmt: skip
 
     def redefines(self, bench: Bench) -> bool:
-        typed = [deed for deed in bench.deeds[-12:] if isinstance(deed, Say | Raw | Power)]  # O takes its time
-        programs = any(isinstance(deed, Say) and deed.text == "O 0" for deed in bench.deeds)
+        typed = [action for action in bench.actions[-12:] if isinstance(action, Say | Raw | Power)]  # O takes its time
+        programs = any(isinstance(action, Say) and action.text == "O 0" for action in bench.actions)
         return (
             any(
-                isinstance(deed, Power)
-                or (isinstance(deed, Raw) and 3 in deed.data)
-                or (isinstance(deed, Say) and deed.text.startswith("O "))
-                for deed in typed
+                isinstance(action, Power)
+                or (isinstance(action, Raw) and 3 in action.data)
+                or (isinstance(action, Say) and action.text.startswith("O "))
+                for action in typed
             )
             or programs
         )
 
-    def onward(self, draw: Random) -> Sequence[Deed]:
+    def onward(self, draw: Random) -> Sequence[Action]:
         match draw.randrange(8):
             case 0 | 1 | 2:
                 return [Say(draw.choice(("+ 400", "- 90", "+ 3", "M 900", "M -5000", "M 0", "F 900 0", "H 1", "H 3")))]
@@ -299,7 +299,9 @@ class Axis:
 
 def absolute(bench: Bench) -> bool:
     """Whether something depends on the number of a position: a trip, the readout of Z 1."""
-    return any(isinstance(deed, Say) and deed.text[:2] in ("T ", "k ", "i ", "Z ", "G ", "C ") for deed in bench.deeds)
+    return any(
+        isinstance(action, Say) and action.text[:2] in ("T ", "k ", "i ", "Z ", "G ", "C ") for action in bench.actions
+    )
 
 
 def named(bench: Bench) -> bool:
@@ -319,7 +321,7 @@ def busy(bench: Bench) -> bool:
 
 def listens(bench: Bench) -> bool:
     """Whether a line is heard: signed on, not in program mode, no other line before it."""
-    last = next((deed.text for deed in reversed(bench.deeds) if isinstance(deed, Say)), "")
+    last = next((action.text for action in reversed(bench.actions) if isinstance(action, Say)), "")
     waits = bool(bench.device._inbox) or (last.startswith("P") and bench.device.answering)  # type: ignore[attr-defined]
     storing = bool(bench.device._desk.programming)  # type: ignore[attr-defined]
     return state(bench) not in ("waiting", "off") and not waits and not storing

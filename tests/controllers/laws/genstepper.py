@@ -5,7 +5,7 @@ from random import Random
 from typing import Any
 
 from tests.controllers.laws.adapter import Limit, Redefinition, Stop
-from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
+from tests.controllers.laws.bench import Action, Bench, Contact, Power, Put, Raw, Say, Wait
 
 from detent.controllers.genstepper.firmware import GenStepper
 from detent.pins import HIGH, LOW, Level
@@ -68,7 +68,7 @@ class Board:
     def make(self, options: Mapping[str, Any]) -> GenStepper:
         return GenStepper(self.name, line_timing=False, hard_stop=self._hard, **options)
 
-    def ready(self) -> Sequence[Deed]:
+    def ready(self) -> Sequence[Action]:
         return (Wait(300 * MS),)  # deaf for a quarter of a second (page 22)
 
     def contacts(self, draw: Random) -> tuple[Contact, ...]:
@@ -79,7 +79,7 @@ class Board:
             found.append(Contact(pin, pin[1], low, low + width))
         return tuple(found)
 
-    def deeds(self, draw: Random) -> Sequence[Deed]:
+    def actions(self, draw: Random) -> Sequence[Action]:
         who, letter = draw.choice(("X", "Y", "B", "", "")), draw.choice
         steps = draw.choice(STEPS) if draw.random() < 0.7 else draw.randint(-600, 600)
         match draw.randrange(16):
@@ -102,7 +102,7 @@ class Board:
                 return self.meanwhile(draw)
         return self._rare(draw)
 
-    def _rare(self, draw: Random) -> Sequence[Deed]:
+    def _rare(self, draw: Random) -> Sequence[Action]:
         match draw.randrange(7):
             case 0:
                 return [Power(False), Wait(1 * MS), Power(True), *self.ready()]
@@ -114,7 +114,7 @@ class Board:
                 return [Say(draw.choice(("15T", "0T", "240T", "0T")))]
         return [Raw(draw.randbytes(draw.randrange(5)), draw.randrange(-1, 3))]
 
-    def meanwhile(self, draw: Random) -> Sequence[Deed]:
+    def meanwhile(self, draw: Random) -> Sequence[Action]:
         return [Say(draw.choice(QUESTIONS))]
 
     def phase(self, bench: Bench, axis: str) -> str:
@@ -123,7 +123,7 @@ class Board:
             REPORTS[told] if told < 8 else "quick stop" if bench.travels[axis].moving else "idle"
         )  # 8: a limit is seen
 
-    def let_go(self, bench: Bench) -> Sequence[Deed]:
+    def let_go(self, bench: Bench) -> Sequence[Action]:
         return [Put(key, HIGH) for key in KEYS if bench.level(key) == LOW]
 
     def stops(self) -> Sequence[Stop]:
@@ -153,12 +153,12 @@ class Board:
         return Redefinition("=", "38", [Say(f"{who}{value}=")], [Say(f"{who}{value}Z")], value, axes, hears)
 
     def redefines(self, bench: Bench) -> bool:
-        last = bench.deeds[-1]
+        last = bench.actions[-1]
         if isinstance(last, Say):
             return "=" in last.text or "!" in last.text
         return isinstance(last, Power) or (isinstance(last, Raw) and bool(set(last.data) & set(b"=!")))
 
-    def onward(self, draw: Random) -> Sequence[Deed]:
+    def onward(self, draw: Random) -> Sequence[Action]:
         match draw.randrange(8):
             case 0 | 1 | 2:
                 return [Say(f"{draw.choice('XYB')}{draw.choice((300, -900, 5, 4000))}S")]

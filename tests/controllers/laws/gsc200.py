@@ -5,7 +5,7 @@ from random import Random
 from typing import Any
 
 from tests.controllers.laws.adapter import Limit, Redefinition, Stop
-from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
+from tests.controllers.laws.bench import Action, Bench, Contact, Power, Put, Raw, Say, Wait
 
 from detent.controllers.gsc200.firmware import GsC200
 from detent.pins import HIGH, LOW
@@ -83,7 +83,7 @@ class Module:
         straps = {"CHS": 0, "REC": 0 if options.get("recall") else 1}
         return GsC200(self.name, straps, line_timing=False)
 
-    def ready(self) -> Sequence[Deed]:
+    def ready(self) -> Sequence[Action]:
         return ()
 
     def contacts(self, draw: Random) -> tuple[Contact, ...]:
@@ -95,7 +95,7 @@ class Module:
                 found.append(Contact(pin, "", low, low + draw.choice((10**9, 10**9, 4))))
         return tuple(found)
 
-    def deeds(self, draw: Random) -> Sequence[Deed]:
+    def actions(self, draw: Random) -> Sequence[Action]:
         match draw.randrange(16):
             case 0 | 1 | 2:
                 return [Say(draw.choice(MOVES))]
@@ -119,7 +119,7 @@ class Module:
                 return self.meanwhile(draw)
         return self._rare(draw)
 
-    def _rare(self, draw: Random) -> Sequence[Deed]:
+    def _rare(self, draw: Random) -> Sequence[Action]:
         match draw.randrange(4):
             case 0:
                 return [Power(False), Wait(1 * MS), Power(True), *self.ready()]
@@ -127,7 +127,7 @@ class Module:
                 return [Put("ENABLE", LOW)]
         return [Raw(bytes(draw.choices(b"KZF+9 ;\x80\xff", k=3)) + b"\r", draw.randrange(-1, 3))]
 
-    def meanwhile(self, draw: Random) -> Sequence[Deed]:
+    def meanwhile(self, draw: Random) -> Sequence[Action]:
         return [Say(draw.choice(QUESTIONS))]
 
     def phase(self, bench: Bench, axis: str) -> str:
@@ -145,7 +145,7 @@ class Module:
         then = train.time_of(far) - train.time_of(far - 1) if far > given + 1 else now
         return "at speed" if 0.98 < now / (then or 1) < 1.02 else "slowing" if then > now else "speeding up"
 
-    def let_go(self, bench: Bench) -> Sequence[Deed]:
+    def let_go(self, bench: Bench) -> Sequence[Action]:
         return ()
 
     def stops(self) -> Sequence[Stop]:
@@ -187,12 +187,12 @@ class Module:
 
     def redefines(self, bench: Bench) -> bool:
         """I1, I3 and f; power; homing, when it is complete."""
-        words = {deed.text for deed in bench.deeds if isinstance(deed, Say)}
+        words = {action.text for action in bench.actions if isinstance(action, Say)}
         homes = bool(words & {"H", "H-"}) or self.name == "gs-c200s" or bench.device.straps["REC"] == LOW
-        last = bench.deeds[-1]
+        last = bench.actions[-1]
         return homes or isinstance(last, Power) or (isinstance(last, Say) and last.text in ("I1", "I3"))
 
-    def onward(self, draw: Random) -> Sequence[Deed]:
+    def onward(self, draw: Random) -> Sequence[Action]:
         moves = ("+1", "+40", "+700", "+9000", "F", "V2", "Z", "K", "S20", "A1", "Y9")
         own = ("-40", "g+", "g-2", "g+1") if self.name == "gs-c200s" else ()
         return [Say(draw.choice(moves + own))] if draw.random() < 0.8 else [Put("UI2", LOW), Wait(1), Put("UI2", HIGH)]

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from random import Random
 from typing import Any, NamedTuple, TypeVar
 
-from tests.controllers.laws.bench import Contact, Deed, Wait
+from tests.controllers.laws.bench import Action, Contact, Wait
 
 from detent.ticks import MS, Ns
 
@@ -26,14 +26,14 @@ class History(NamedTuple):
 
     options: Mapping[str, Any]
     contacts: tuple[Contact, ...]
-    deeds: tuple[Deed, ...]
-    later: tuple[Deed, ...] = ()
+    actions: tuple[Action, ...]
+    later: tuple[Action, ...] = ()
     motor: str | None = None
 
     def smaller(self) -> "Iterator[History]":
         """The same with one thing less, or one wait shorter."""
-        for n in reversed(range(len(self.deeds))):
-            yield self._replace(deeds=self.deeds[:n] + self.deeds[n + 1 :])
+        for n in reversed(range(len(self.actions))):
+            yield self._replace(actions=self.actions[:n] + self.actions[n + 1 :])
         for n in reversed(range(len(self.later))):
             yield self._replace(later=self.later[:n] + self.later[n + 1 :])
         for n in range(len(self.contacts)):
@@ -42,14 +42,14 @@ class History(NamedTuple):
             yield self._replace(motor=None)
         for name in self.options:
             yield self._replace(options={key: value for key, value in self.options.items() if key != name})
-        for n, deed in enumerate(self.deeds):
-            if isinstance(deed, Wait):
-                for time in (gap for gap in GAPS if gap < deed.time and gap % MS == 0):
-                    yield self._replace(deeds=(*self.deeds[:n], Wait(time), *self.deeds[n + 1 :]))
+        for n, action in enumerate(self.actions):
+            if isinstance(action, Wait):
+                for time in (gap for gap in GAPS if gap < action.time and gap % MS == 0):
+                    yield self._replace(actions=(*self.actions[:n], Wait(time), *self.actions[n + 1 :]))
 
 
 def gap(draw: Random) -> Ns:
-    """Time between two deeds."""
+    """Time between two actions."""
     return draw.choice(GAPS) if draw.random() < 0.7 else draw.randrange(60 * MS)
 
 
@@ -74,12 +74,12 @@ def hold(
 
 
 def shown(history: History) -> str:
-    """A history as a person reads it, a deed a line."""
+    """A history as a person reads it, an action a line."""
     lines = [f"  {name} = {value!r}" for name, value in history.options.items()]
     lines += [f"  {contact}" for contact in history.contacts]
     lines += [] if history.motor is None else [f"  a motor on {history.motor or 'the axis'}"]
-    later = [f"  {deed}" for deed in history.later]
-    return "\n".join(lines + [f"  {deed}" for deed in history.deeds] + ["later", *later] * bool(later))
+    later = [f"  {action}" for action in history.later]
+    return "\n".join(lines + [f"  {action}" for action in history.actions] + ["later", *later] * bool(later))
 
 
 def _smallest(

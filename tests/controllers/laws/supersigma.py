@@ -5,7 +5,7 @@ from random import Random
 from typing import Any
 
 from tests.controllers.laws.adapter import Limit, Redefinition, Stop
-from tests.controllers.laws.bench import Bench, Contact, Deed, Power, Put, Raw, Say, Wait
+from tests.controllers.laws.bench import Action, Bench, Contact, Power, Put, Raw, Say, Wait
 
 from detent.controllers.supersigma.firmware import Supersigma
 from detent.pins import HIGH, LOW
@@ -49,7 +49,7 @@ class Drive:
     def make(self, options: Mapping[str, Any]) -> Supersigma:
         return Supersigma(number=1, line_timing=False, **options)
 
-    def ready(self) -> Sequence[Deed]:
+    def ready(self) -> Sequence[Action]:
         return ()
 
     def contacts(self, draw: Random) -> tuple[Contact, ...]:
@@ -59,7 +59,7 @@ class Drive:
         low, high = (at - 10**9, at) if at < 0 else (at, at + 10**9)
         return (Contact("RAIL", "", low, high) if draw.random() < 0.7 else Contact("RAIL", "", at, at + 3),)
 
-    def deeds(self, draw: Random) -> Sequence[Deed]:
+    def actions(self, draw: Random) -> Sequence[Action]:
         steps = draw.choice(STEPS) * draw.choice((1, -1))
         speed = draw.choice((1, 6, 7, 30, 90, 150, 255))
         match draw.randrange(12):
@@ -80,7 +80,7 @@ class Drive:
                 return self.meanwhile(draw)
         return self._rare(draw)
 
-    def _rare(self, draw: Random) -> Sequence[Deed]:
+    def _rare(self, draw: Random) -> Sequence[Action]:
         match draw.randrange(3):
             case 0:
                 return [Power(False), Wait(1 * MS), Power(True)]
@@ -88,7 +88,7 @@ class Drive:
                 return [Put(draw.choice(("RAIL", "FORCE")), LOW)]
         return [Raw(bytes((2, draw.choice((1, 0x81)))) + draw.randbytes(2)), Raw(b"\x03\x05")]  # to other drives
 
-    def meanwhile(self, draw: Random) -> Sequence[Deed]:
+    def meanwhile(self, draw: Random) -> Sequence[Action]:
         return [Say(draw.choice(QUESTIONS))]
 
     def phase(self, bench: Bench, axis: str) -> str:
@@ -103,7 +103,7 @@ class Drive:
         now, then = travel.rate(bench.now), travel.rate(bench.now + 4 * MS)
         return "at speed" if 0.98 < now / (then or 1) < 1.02 else "slowing" if then < now else "speeding up"
 
-    def let_go(self, bench: Bench) -> Sequence[Deed]:
+    def let_go(self, bench: Bench) -> Sequence[Action]:
         return ()
 
     def stops(self) -> Sequence[Stop]:
@@ -127,9 +127,9 @@ class Drive:
 
     def redefines(self, bench: Bench) -> bool:
         """Power, and the origin, when it is found."""
-        return isinstance(bench.deeds[-1], Power) or Say("originate") in bench.deeds
+        return isinstance(bench.actions[-1], Power) or Say("originate") in bench.actions
 
-    def onward(self, draw: Random) -> Sequence[Deed]:
+    def onward(self, draw: Random) -> Sequence[Action]:
         return ()
 
     def told(self, bench: Bench, axis: str) -> int | None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pytest
 from tests.controllers.laws.adapter import Model
-from tests.controllers.laws.bench import Deed, Say, Wait
+from tests.controllers.laws.bench import Action, Say, Wait
 from tests.controllers.laws.histories import ORDINARY, THOROUGH, History, gap, hold
 from tests.controllers.laws.models import MODELS
 
@@ -63,7 +63,7 @@ class Plan(NamedTuple):
     """How many units, what is said to them, who is stopped and how ("" and bytes: all of them)."""
 
     units: int
-    said: tuple[tuple[str, Deed], ...]
+    said: tuple[tuple[str, Action], ...]
     unit: str
     stop: str
 
@@ -71,11 +71,11 @@ class Plan(NamedTuple):
 def plan(draw: Random, shared: Shared) -> Plan:
     units = UNITS[: draw.randint(2, 3)]
     model: Model = next(model for model in MODELS if model.name == shared.model)
-    said: list[tuple[str, Deed]] = []
+    said: list[tuple[str, Action]] = []
     for _ in range(draw.randint(1, 8)):
         unit = draw.choice(units)
-        typed = [deed for deed in model.deeds(draw) if isinstance(deed, Say | Wait)]
-        said += [(unit, deed) for deed in (*typed, Wait(min(gap(draw), 400 * MS)))]
+        typed = [action for action in model.actions(draw) if isinstance(action, Say | Wait)]
+        said += [(unit, action) for action in (*typed, Wait(min(gap(draw), 400 * MS)))]
     everybody = bool(shared.everybody) and draw.random() < 0.3
     return Plan(len(units), tuple(said), "" if everybody else draw.choice(units), draw.choice(shared.one))
 
@@ -92,11 +92,11 @@ def a_stop_is_for_those_it_is_meant_for(shared: Shared, made: Plan) -> bool:
         cell = build(parse(shared.text(UNITS[: made.units]), "cell"), str, line_timing=False)
         cell.run_to(100 * MS)
         cell.send(0, shared.before)
-        for unit, deed in made.said:
-            if isinstance(deed, Say):
-                cell.type(unit, deed.text)
-            elif isinstance(deed, Wait):
-                cell.run_to(cell.now + deed.time)
+        for unit, action in made.said:
+            if isinstance(action, Say):
+                cell.type(unit, action.text)
+            elif isinstance(action, Wait):
+                cell.run_to(cell.now + action.time)
         if stopped and made.unit:
             cell.type(made.unit, made.stop)
         elif stopped:

@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 from tests.controllers.laws.adapter import Limit, Model, history, ready
-from tests.controllers.laws.bench import Bench, Deed, Put, Wait, Watch
+from tests.controllers.laws.bench import Action, Bench, Put, Wait, Watch
 from tests.controllers.laws.histories import ORDINARY, THOROUGH, History, hold
 from tests.controllers.laws.models import every_model
 
@@ -75,7 +75,7 @@ def a_closed_limit_is_not_passed(model: Model, past: History) -> bool:
     bench = ready(model, past)
     guards = [Guard(limit) for limit in model.limits()]
     bench.watches += guards
-    bench.play(past.deeds)
+    bench.play(past.actions)
     pins = [pin.name for pin in bench.device.pins]
     for limit in model.limits():
         if limit.direction in (0, bench.travels[limit.axis].direction) and limit.name in pins and bench.moving:
@@ -90,9 +90,9 @@ def check(model: Model, count: int) -> None:
     def make(draw: Random) -> tuple[History, None]:
         past = history(model, draw, 16)
         contacts = next((found for _ in range(9) if (found := model.contacts(draw))), ())
-        later: list[Deed] = []
+        later: list[Action] = []
         for _ in range(draw.randrange(4)):
-            later += (*model.deeds(draw), Wait(draw.choice((0, 1 * MS, 9 * MS, 40 * MS))))
+            later += (*model.actions(draw), Wait(draw.choice((0, 1 * MS, 9 * MS, 40 * MS))))
         return past._replace(contacts=contacts, later=tuple(later)), None
 
     told = hold(lambda past, _: a_closed_limit_is_not_passed(model, past), make, count, f"limits of {model.name}")

@@ -7,7 +7,7 @@ nothing. Cells of one or two units of any model, with wires from each output to 
 from random import Random
 
 import pytest
-from tests.controllers.laws.bench import Deed, Say, Wait
+from tests.controllers.laws.bench import Action, Say, Wait
 from tests.controllers.laws.histories import ORDINARY, THOROUGH, History, gap, hold
 from tests.controllers.laws.models import MODELS
 from tests.controllers.laws.test_order import Plan, pins, play
@@ -21,27 +21,27 @@ from detent.ticks import MS, US
 BUSY = 5_000  # changes of levels and motions, behind which a cell has swung enough
 
 
-def plan(draw: Random, first: str) -> tuple[Plan, tuple[tuple[str, Deed], ...]]:
+def plan(draw: Random, first: str) -> tuple[Plan, tuple[tuple[str, Action], ...]]:
     units = {"ua": first} if draw.random() < 0.6 else {"ua": first, "ub": draw.choice(MODELS).name}
     models = {model.name: model for model in MODELS}
     sources = [f"{u}.{p}" for u, m in units.items() for p in pins(m, PinKind.OUTPUT, PinKind.OPEN_COLLECTOR)]
     sinks = [f"{u}.{p}" for u, m in units.items() for p in pins(m, PinKind.INPUT)]
     some = draw.sample(sources, min(2, len(sources)))  # a few, each to several inputs: keys in pairs
     wires = tuple((draw.choice(some), sink) for sink in draw.sample(sinks, min(draw.randint(1, 6), len(sinks))))
-    done: list[tuple[str, Deed]] = []
+    done: list[tuple[str, Action]] = []
     for _ in range(draw.randint(1, 8)):
         unit = draw.choice(list(units))
-        done += [(unit, deed) for deed in (*models[units[unit]].deeds(draw), Wait(min(gap(draw), 12 * MS)))]
+        done += [(unit, action) for action in (*models[units[unit]].actions(draw), Wait(min(gap(draw), 12 * MS)))]
     return Plan(units, wires, party=False), tuple(done)
 
 
-def time_goes_on(plan: Plan, done: tuple[tuple[str, Deed], ...]) -> bool:
+def time_goes_on(plan: Plan, done: tuple[tuple[str, Action], ...]) -> bool:
     cell = build(parse(plan.text(list(plan.units), powered=True), "cell"), str, line_timing=False)
     cell.run_to(300 * MS)
     recording = cell.recording
     assert recording is not None
-    for deed in done:
-        play(cell, [deed])
+    for action in done:
+        play(cell, [action])
         if sum(len(recording.of(unit)) for unit in plan.units) > BUSY:
             break
     cell.run_to(cell.now + 1 * MS)
@@ -49,7 +49,7 @@ def time_goes_on(plan: Plan, done: tuple[tuple[str, Deed], ...]) -> bool:
 
 
 def check(name: str, count: int) -> None:
-    def make(draw: Random) -> tuple[History, tuple[Plan, tuple[tuple[str, Deed], ...]]]:
+    def make(draw: Random) -> tuple[History, tuple[Plan, tuple[tuple[str, Action], ...]]]:
         return History({}, (), ()), plan(draw, name)
 
     assert hold(lambda _, made: time_goes_on(*made), make, count, f"loops of {name}") > count // 4

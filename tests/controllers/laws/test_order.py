@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pytest
 from tests.controllers.laws.adapter import Model
-from tests.controllers.laws.bench import Deed, Power, Put, Raw, Say, Wait
+from tests.controllers.laws.bench import Action, Power, Put, Raw, Say, Wait
 from tests.controllers.laws.histories import ORDINARY, THOROUGH, History, gap, hold
 from tests.controllers.laws.models import MODELS
 
@@ -73,20 +73,20 @@ def plan(draw: Random, *, edges: bool) -> Plan:
     return Plan(units, tuple(wires), draw.random() < 0.5)
 
 
-def deeds(draw: Random, units: Mapping[str, str]) -> tuple[tuple[str, Deed], ...]:
+def actions(draw: Random, units: Mapping[str, str]) -> tuple[tuple[str, Action], ...]:
     """What happens to the units of a cell."""
     models = {model.name: model for model in MODELS}
-    found: list[tuple[str, Deed]] = []
+    found: list[tuple[str, Action]] = []
     for _ in range(draw.randrange(8)):
         unit = draw.choice(list(units))
         model: Model = models[units[unit]]
-        found += [(unit, deed) for deed in (*model.deeds(draw), Wait(min(gap(draw), 200 * MS)))]
+        found += [(unit, action) for action in (*model.actions(draw), Wait(min(gap(draw), 200 * MS)))]
     return tuple(found)
 
 
-def play(cell: Cell, done: Sequence[tuple[str, Deed]]) -> None:
-    for unit, deed in done:
-        match deed:
+def play(cell: Cell, done: Sequence[tuple[str, Action]]) -> None:
+    for unit, action in done:
+        match action:
             case Say(text):
                 cell.type(unit, text)
             case Raw(data):
@@ -102,7 +102,7 @@ def play(cell: Cell, done: Sequence[tuple[str, Deed]]) -> None:
 Seen = Mapping[str, object] | str
 
 
-def order_in_the_file(plan: Plan, order: Sequence[str], done: Sequence[tuple[str, Deed]]) -> Seen:
+def order_in_the_file(plan: Plan, order: Sequence[str], done: Sequence[tuple[str, Action]]) -> Seen:
     """Everything that each unit does, in a cell with its units in this order."""
     try:
         cell = build(parse(plan.text(order, powered=True), "cell"), str, line_timing=False)
@@ -115,7 +115,7 @@ def order_in_the_file(plan: Plan, order: Sequence[str], done: Sequence[tuple[str
     return {unit: [item for item in cell.recording.of(unit) if not isinstance(item, InputSet)] for unit in plan.units}
 
 
-def order_of_supply(plan: Plan, order: Sequence[str], done: Sequence[tuple[str, Deed]]) -> Seen:
+def order_of_supply(plan: Plan, order: Sequence[str], done: Sequence[tuple[str, Action]]) -> Seen:
     """The motions of each unit, in a cell with its units switched on in this order."""
     try:
         cell = build(parse(plan.text(list(plan.units), powered=False), "cell"), str, line_timing=False)
@@ -139,12 +139,12 @@ def order_of_supply(plan: Plan, order: Sequence[str], done: Sequence[tuple[str, 
 def check(count: int, *, supply: bool) -> None:
     seen = order_of_supply if supply else order_in_the_file
 
-    def make(draw: Random) -> tuple[History, tuple[Plan, list[str], tuple[tuple[str, Deed], ...]]]:
+    def make(draw: Random) -> tuple[History, tuple[Plan, list[str], tuple[tuple[str, Action], ...]]]:
         made = plan(draw, edges=supply)
         order = draw.sample(list(made.units), len(made.units))
-        return History({}, (), ()), (made, order, deeds(draw, made.units))
+        return History({}, (), ()), (made, order, actions(draw, made.units))
 
-    def law(_: History, then: tuple[Plan, list[str], tuple[tuple[str, Deed], ...]]) -> bool:
+    def law(_: History, then: tuple[Plan, list[str], tuple[tuple[str, Action], ...]]) -> bool:
         made, order, done = then
         here, there = seen(made, list(made.units), done), seen(made, order, done)
         assert here == there, differing(here, there) if not isinstance(here, str) else f"{here}, and {there}"

@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 from tests.controllers.laws.adapter import Model, Redefinition, history, ready
-from tests.controllers.laws.bench import Bench, Deed, Wait, Watch
+from tests.controllers.laws.bench import Action, Bench, Wait, Watch
 from tests.controllers.laws.histories import ORDINARY, THOROUGH, History, gap, hold
 from tests.controllers.laws.models import every_model
 
@@ -42,15 +42,15 @@ class Windings(Watch):
 
 def redefining_moves_nothing(model: Model, past: History, way: Redefinition) -> bool:
     benches = []
-    for deeds in (way.deeds, way.neutral):
+    for actions in (way.actions, way.neutral):
         bench = ready(model, past)
         windings = Windings()
         bench.watches.append(windings)
-        bench.play(past.deeds)
+        bench.play(past.actions)
         if not way.applies(bench):
             return False
         shafts = {axis: travel.shaft(bench.now) for axis, travel in bench.travels.items()}
-        bench.play(deeds)
+        bench.play(actions)
         benches.append((bench, windings, shafts))
     (one, given, _), (other, expected, _) = benches
     places = {axis: (one.travels[axis].shaft(one.now), number(one, axis)) for axis in way.axes}
@@ -107,7 +107,7 @@ def check(model: Model, count: int) -> None:
     def make(draw: Random) -> tuple[History, Redefinition]:
         way = model.redefinition(draw)
         assert way is not None
-        later: list[Deed] = []
+        later: list[Action] = []
         for _ in range(draw.randrange(6)):
             later += (*model.onward(draw), Wait(gap(draw)))
         return history(model, draw, 6)._replace(later=tuple(later)), way
@@ -129,7 +129,7 @@ class Counter(Watch):
         self._compare(bench)
 
     def look(self, bench: Bench) -> None:
-        if not bench.deeds or not self._model.redefines(bench):
+        if not bench.actions or not self._model.redefines(bench):
             self._compare(bench)
         else:
             self._offsets = {axis: self._offset(bench, axis) for axis in bench.travels}
@@ -146,7 +146,7 @@ class Counter(Watch):
 def the_counter_follows_the_shaft(model: Model, past: History) -> None:
     bench = ready(model, past)
     bench.watches.append(Counter(model, bench))
-    bench.play(past.deeds)
+    bench.play(past.actions)
 
 
 def check_counter(model: Model, count: int) -> None:

@@ -65,8 +65,8 @@ def compare(bench: Bench, expected: Sequence[tuple[Ns, int]], lines: Sequence[Li
 def play(bench: Bench, program: Program, pins: Mapping[int, str], long: Ns) -> Ns:
     """Let inputs change as the program has it; when it began."""
     begun = bench.now
-    deeds = sorted((at, pin, n) for pin, times in program.changes.items() for n, at in enumerate(times))
-    for at, pin, n in deeds:
+    actions = sorted((at, pin, n) for pin, times in program.changes.items() for n, at in enumerate(times))
+    for at, pin, n in actions:
         bench.play((Wait(begun + at - bench.now), Put(pins[pin], HIGH if n % 2 else LOW)))
     bench.play((Wait(max(begun + long - bench.now, 0)),))
     return begun
@@ -269,7 +269,7 @@ def runs_as_the_datasheet_says(model: gsc200.Module, enter: str, program: Progra
 def a_wait_for_idle_ends_with_the_motion(past: History, wait: Ns) -> bool:
     """I: "not received until the motion completes" (page 29); RDY is high when both motors rest (page 22)."""
     bench = ready(genstepper.MODELS[0], past)
-    bench.play((*past.deeds, Say("0V"), Wait(wait)))
+    bench.play((*past.actions, Say("0V"), Wait(wait)))
     if not genstepper.hears(bench) or bench.pin("RDY") == HIGH:
         return False
     bench.play((Say("B"), Wait(2 * MS), Say("I")))
@@ -290,7 +290,7 @@ def a_wait_for_idle_ends_with_the_motion(past: History, wait: Ns) -> bool:
 def status_tells_the_steps_of_its_instant(past: History, wait: Ns) -> bool:
     """ "The CCU is able to interrogate the microcomputer about the number of steps performed" (Status)."""
     bench = ready(supersigma.MODELS[0], past)
-    bench.play((*past.deeds, Wait(wait)))
+    bench.play((*past.actions, Wait(wait)))
     if bench.device.status(bench.now).state == "off":
         return False
     travel, place, now = bench.travels[""], len(bench.out), bench.now

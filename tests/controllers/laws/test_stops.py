@@ -20,7 +20,7 @@ def a_stop_leads_to_rest(model: Model, past: History, stop: Stop, met: Met) -> b
         return False
     begun, allowed, axes = bench.now, stop.allowed(bench), stop.axes(bench)
     phases = {(model.phase(bench, axis), stop.name) for axis in axes}
-    bench.play((*stop.deeds(bench), *past.later))
+    bench.play((*stop.actions(bench), *past.later))
     bench.go_to(max(begun + allowed, bench.now))
     for axis in axes:
         assert not bench.travels[axis].moving, f"{stop.name} at {begun} ns: {axis or 'it'} moves {allowed} ns later"
@@ -37,7 +37,7 @@ def a_stop_leads_to_rest(model: Model, past: History, stop: Stop, met: Met) -> b
 def before(model: Model, past: History, stop: Stop) -> Bench:
     """A device behind a history, ready for a stop: no key is held that would set it off again."""
     bench = ready(model, past)
-    bench.play(past.deeds)
+    bench.play(past.actions)
     if not stop.holding:
         bench.play(model.let_go(bench))
     return bench

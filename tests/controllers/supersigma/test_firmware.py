@@ -237,9 +237,9 @@ def test_a_message_is_not_kept_over_a_power_failure() -> None:
 
 def test_it_has_no_memory_for_programs() -> None:
     drive = Supersigma()
-    for deed in (lambda: drive.restore(b""), lambda: drive.load(b"", 0, 0)):
+    for action in (lambda: drive.restore(b""), lambda: drive.load(b"", 0, 0)):
         with pytest.raises(ImageError, match="holds no programs"):
-            deed()
+            action()
 
 
 def test_a_copy_in_the_middle_of_a_ramp_goes_on_alike() -> None:

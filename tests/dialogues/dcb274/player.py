@@ -87,8 +87,8 @@ class Player:
             self.expect(SIGN_ON)
         for self.number, self.line in body:
             word, _, rest = self.line.partition(" ")
-            deed = {">": self.say, ">>": self.say_raw, "<": self.hear, "<<": self.hear_raw}.get(word)
-            (deed or getattr(self, f"do_{word}"))(rest)
+            action = {">": self.say, ">>": self.say_raw, "<": self.hear, "<<": self.hear_raw}.get(word)
+            (action or getattr(self, f"do_{word}"))(rest)
         self.nothing_left()
 
     def header(self, line: str) -> bool:

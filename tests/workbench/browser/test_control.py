@@ -8,7 +8,7 @@ import pytest
 from tests.cli.test_control import run
 from tests.workbench.browser.windows import Served, Windows
 
-DEED = "(text) => (detent.get('marks') || []).some((mark) => mark[3] === text)"
+ACTION = "(text) => (detent.get('marks') || []).some((mark) => mark[3] === text)"
 
 
 @pytest.fixture
@@ -45,7 +45,7 @@ def test_what_a_program_does_shows_in_the_window_like_everything_else(
     assert control("faults")["faults"] == [], "a click mends what a program has broken"
     control("set", "bar.UI2", "low")
     window.until("() => detent.get('u.bar.pin.UI2') === 0")
-    window.until(DEED, "UI2 to 0")
+    window.until(ACTION, "UI2 to 0")
     control("type", "V1", "--unit", "bar")
     page.get_by_text("1 command waits").wait_for()
     control("step")

@@ -92,6 +92,11 @@ class Handshake(Driver):
         yield Pause(RESTART)
         yield Clear()
 
+    def signs_on(self) -> Steps[bool]:
+        """Whether a unit that takes no line waits for its sign-on, and has done it now: it was reset."""
+        return False
+        yield
+
     def refused(self, text: str, spoken: Spoken) -> Refused:
         """The error for a line that was answered ``#``."""
         return Refused(self.title, f"refuses {text!r}: {meaning(text)}", spoken, "#")
@@ -142,6 +147,13 @@ class SingleMode(Handshake):
         self.programming = False
         yield from self.reports_off()
         return version.group().decode() if version else ""
+
+    def signs_on(self) -> Steps[bool]:
+        """SPACE is answered with the version then (page 23), and by nothing where a program runs or a command waits."""
+        answer = yield Ask(SPACE, until(b"\r\n"), self.patience)
+        if answer.data == SPACE:
+            yield from self._erase()
+        return re.search(rb"V\d+\.\d+", answer.data) is not None
 
     def line(self, text: str, seconds: float, tries: int = TRIES) -> Steps[str]:
         """Each character when the echo of the last has come, CR, the result up to CR LF."""

@@ -130,7 +130,12 @@ class Unit(Axis):
         try:
             return (yield from self._way.line(text, seconds, tries))
         except NoAnswer as error:
-            self._connected = isinstance(error, NotListening)
+            deaf = isinstance(error, NotListening)
+            self._connected = deaf and (self._way.running or not (yield from self._way.signs_on()))
+            if deaf and not self._connected:
+                self._leave(None)
+                what = "was switched off and on, or reset: it is at 0, with the settings of its NV memory"
+                raise NoAnswer(self.title, what, error.spoken) from None
             raise
         except GeneratorExit:  # the caller was cancelled
             self._connected, self._broken = False, True
