@@ -4,10 +4,10 @@ Order within one instant (the contract of `controllers.device`): units that are 
 after them; then what they did is delivered (`cell.circuit`).
 """
 
-import copy
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
 
+from detent.cell import idling
 from detent.cell.actions import (
     Action,
     Break,
@@ -28,6 +28,7 @@ from detent.cell.actions import (
 )
 from detent.cell.breakage import Breakage
 from detent.cell.circuit import Circuit
+from detent.cell.copying import duplicate
 from detent.cell.faults import Fault
 from detent.cell.outside import Outside, Store, Typed, no_store, nobody_asks
 from detent.cell.recording import Log, Recording
@@ -101,8 +102,16 @@ class Cell:
         """
         if until > self.latest:
             raise ValueError(f"this cell runs to {show_duration(self.latest)} at most, and not to {until} ns")
+        instants, look, most = 0, idling.FIRST, idling.FIRST // idling.PATIENCE
         while (at := self._next()) <= until:
             self._advance(at)
+            instants += 1
+            if instants == look:
+                if idling.pass_over(self.circuit, min(until, self._script_deadline), most):
+                    instants, look, most = 0, idling.FIRST, idling.FIRST // idling.PATIENCE
+                else:
+                    # one more: another place of a loop, where it may be that no pulse of an output is on its way
+                    look, most = look + most * idling.PATIENCE + 1, min(2 * most, idling.MOST)
         self.circuit.now = max(self.now, until)
 
     def step(self) -> Ns | None:
@@ -457,7 +466,7 @@ class Cell:
 
     def copy(self) -> "Cell":
         """An independent cell that goes on exactly as this one would."""
-        return copy.deepcopy(self)
+        return duplicate(self)
 
     def _part_with_contact(self, name: str) -> int:
         """The part that the switch `name` on an axis belongs to: itself, or the motor that moves it."""

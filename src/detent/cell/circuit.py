@@ -8,9 +8,9 @@ one cause, are an oscillation, and an error that names its pins.
 
 from collections import Counter
 from collections.abc import Sequence
-from copy import deepcopy
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.cell.copying import duplicate
 from detent.cell.outside import Outside
 from detent.cell.recording import InputSet, Received, Recording
 from detent.cell.switches import CONTACT
@@ -62,26 +62,26 @@ class Circuit:
         self._supplied: set[int] = set()  # units that are switched on
         self._strange: dict[int, Format] = {}  # units that speak in another format than their line
         self._driving: set[tuple[int, str]] = set()  # outputs that drive their nets: the others let them float
-        self._deadlines: list[Ns] = [NEVER] * len(parts)
+        self.deadlines: list[Ns] = [NEVER] * len(parts)  # when each part is to be advanced next
         self.line_deadline: Ns = NEVER  # the earliest of all lines
         self._touched: set[int] = set()
         self._instant: Ns = -1
         self._deliveries: Counter[str] = Counter()  # of this instant, by pin
         wired = [(bool(drives), wiring.names[part] if drives else "") for part, drives in enumerate(wiring.drives)]
         order = sorted(range(len(parts)), key=wired.__getitem__)
-        self._turn = _Order(map(order.index, range(len(parts))))  # whose turn it is in a round
+        self.turn_of = _Order(map(order.index, range(len(parts))))  # whose turn it is in a round
 
     # -- time --------------------------------------------------------------------------------------------
 
     def next(self) -> Ns:
         """When something happens next by itself; NEVER: nothing is left to do."""
-        at, line = min(self._deadlines), self.line_deadline
+        at, line = min(self.deadlines), self.line_deadline
         return line if line < at else at
 
     def advance(self, at: Ns) -> None:
         """The deadlines of the parts that are due at `at`, which is now, and what follows from them."""
         units, contacts = self.wiring.units, False
-        for index, deadline in enumerate(self._deadlines):
+        for index, deadline in enumerate(self.deadlines):
             if deadline <= at:
                 if index < units:
                     self.parts[index].advance(at)
@@ -91,7 +91,7 @@ class Circuit:
         self._settle()
         if contacts:  # a pulse that was held in this instant has crossed no switch
             for index in range(units, len(self.parts)):
-                if self._deadlines[index] <= at:
+                if self.deadlines[index] <= at:
                     self.parts[index].advance(at)
                     self._touched.add(index)
             self._settle()
@@ -99,7 +99,7 @@ class Circuit:
     @property
     def parts_due(self) -> Ns:
         """When a part is to be advanced next."""
-        return min(self._deadlines)
+        return min(self.deadlines)
 
     # -- what reaches whom -------------------------------------------------------------------------------
 
@@ -116,7 +116,7 @@ class Circuit:
                 index = touched.pop()
                 self._deliver(index, self._drain(index))
             else:
-                round_ = sorted(touched, key=self._turn.__getitem__)
+                round_ = sorted(touched, key=self.turn_of.__getitem__)
                 touched.clear()
                 for index, out in [(index, self._drain(index)) for index in round_]:
                     self._deliver(index, out)
@@ -125,7 +125,7 @@ class Circuit:
         """What a part did, and when it wants to be advanced next."""
         part = self.parts[index]
         deadline = part.next_deadline()
-        self._deadlines[index] = NEVER if deadline is None else deadline
+        self.deadlines[index] = NEVER if deadline is None else deadline
         return part.drain()
 
     def _deliver(self, index: int, out: Sequence[Output]) -> None:
@@ -340,7 +340,7 @@ class Circuit:
         drives = self.wiring.drives[part]
         if not drives:
             return
-        twin = deepcopy(self.parts[part])
+        twin = duplicate(self.parts[part])
         twin.power(True, self.now)
         for item in twin.drain():
             if isinstance(item, PinSet) and item.pin in drives and (part, item.pin) not in self._driving:

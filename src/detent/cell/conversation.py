@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
 from detent.cell.recording import Entry, Recording
+from detent.cell.turns import Turns
 from detent.controllers import catalogue
 from detent.controllers.device import Cautioned, Controller, Refused
 from detent.ticks import Ns
@@ -59,6 +60,11 @@ class Observer(Recording):
                 self._conversation.note_refusal(unit, entry)  # type: ignore[arg-type]
             elif kind is Cautioned:
                 self._conversation.note_caution(unit, entry)  # type: ignore[arg-type]
+
+    def turn(self, turns: Turns[Entry]) -> None:
+        """Programs turned in loops: nothing moved, and nothing was refused."""
+        if self._keeps:
+            super().turn(turns)
 
 
 class Conversation:

@@ -9,6 +9,7 @@ from itertools import islice
 from typing import Generic, NamedTuple, Self, TypeAlias, TypeVar
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.cell.turns import Turns
 from detent.controllers.device import Output
 from detent.pins import Level
 from detent.pulses import Train
@@ -92,34 +93,65 @@ class Log(Generic[T]):
 
 
 class Recording:
-    """What the units of one cell did, in batches: whatever one unit did in one go costs one append."""
+    """What the units of one cell did, in batches: whatever one unit did in one go costs one append.
+
+    Programs that turn in loops may have been told as one turn (`turn`); looked at, everything is there.
+    """
 
     __slots__ = ("_batches", "units")
 
     def __init__(self, units: Sequence[str]) -> None:
         self.units = tuple(units)
-        self._batches: Log[Batch] = Log()
+        self._batches: Log[Batch | Turns[Entry]] = Log()
 
     def __len__(self) -> int:
         """How many entries there are."""
-        return sum(len(entries) for _, entries in self._batches)
+        return sum(item.count if isinstance(item, Turns) else len(item[1]) for item in self._batches)
 
     def __iter__(self) -> Iterator[tuple[int, Entry]]:
         """All entries, in the order in which they happened."""
-        return ((unit, entry) for unit, entries in self._batches for entry in entries)
+        return self.with_kinds()
+
+    def with_kinds(self, *kinds: type[Entry]) -> Iterator[tuple[int, Entry]]:
+        """All entries of these kinds (without any: of all kinds), and perhaps others, in order.
+
+        Whoever says what is wanted does not go through a year of a program that does nothing of it.
+        """
+        for item in self._batches:
+            if isinstance(item, Turns):
+                if not kinds or not item.kinds.isdisjoint(kinds):
+                    yield from item
+            else:
+                unit, entries = item
+                for entry in entries:
+                    yield unit, entry
+
+    def pieces(self) -> Iterator[Batch | Turns[Entry]]:
+        """What it is made of, in order: batches, and programs in loops as one turn of each."""
+        return iter(self._batches)
 
     def extend(self, unit: int, entries: Sequence[Entry]) -> None:
         """Add what one unit did."""
         self._batches.append((unit, entries))
 
+    def turn(self, turns: Turns[Entry]) -> None:
+        """Add what units did whose programs turned in loops: instructions and levels of outputs, nothing else."""
+        self._batches.append(turns)
+
     def take(self) -> list[Batch]:
         """The batches since the last call. For somebody who keeps them elsewhere."""
-        return self._batches.take()
+        taken: list[Batch] = []
+        for item in self._batches.take():
+            if isinstance(item, Turns):
+                taken += [(unit, (entry,)) for unit, entry in item]
+            else:
+                taken.append(item)
+        return taken
 
-    def of(self, unit: str) -> list[Entry]:
-        """The entries of one unit, in order."""
+    def of(self, unit: str, *kinds: type[Entry]) -> list[Entry]:
+        """The entries of one unit, in order; as in `with_kinds`."""
         index = self.units.index(unit)
-        return [entry for i, entry in self if i == index]
+        return [entry for i, entry in self.with_kinds(*kinds) if i == index]
 
     def motion(self, unit: str, until: Ns, axis: str = "") -> list[Span]:
         """The pulses of one axis of a unit up to `until`, in order and without gaps or overlaps."""
@@ -132,7 +164,7 @@ class Recording:
                 spans.append(Span(current.at, at, current.train, current.first, last, current.direction, current.shaft))
             current = None
 
-        for entry in self.of(unit):
+        for entry in self.of(unit, *_MOTION):
             match entry:
                 case MotionStarted() if entry.axis == axis:
                     close(entry.at, entry.first - 1)
@@ -142,3 +174,6 @@ class Recording:
         if current is not None:
             close(until, current.train.steps_by(until))
         return spans
+
+
+_MOTION = (MotionStarted, MotionCut, MotionEnded)

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from detent.cell.recording import Span
+from detent.cell.recording import Entry, Recording, Span
+from detent.cell.turns import Turns
 from detent.controllers.device import Executing, Finished, Powered
 from detent.outputs.axis_motion import Pulses
 from detent.outputs.signals import Signals, UnitSignals
@@ -23,6 +24,7 @@ from detent.pulses.segment import Int64Array
 from detent.ticks import Fixed, Ns, round_fixed, to_fixed
 
 EXACT = 1_500  # so many pulses are drawn one by one
+MANY_TURNS = 100_000  # instructions of programs in loops
 MANY_SEGMENTS = 64  # of a train; beyond that it is sampled as a whole
 DENSE_LOOKS = 4  # motions of a column that are asked for their speed
 
@@ -121,19 +123,24 @@ def lane(unit: UnitSignals, pin: str, until: Ns, columns: int) -> Lane:
 def instructions(signals: Signals, name: str) -> list[Band]:
     """What the unit's program executed, and how long.
 
-    An instruction lasts to the next one, or to the end of the program, of the supply, or of the run.
+    An instruction lasts to the next one, or to the end of the program, of the supply, or of the run. Of a program in a
+    loop, `MANY_TURNS` instructions and more are one band without a word.
     """
     bands: list[Band] = []
     if name not in signals.recording.units:  # a further axis of a unit
         return bands
     current: Executing | None = None
-    for entry in signals.recording.of(name):
-        if entry.at > signals.until:
+    for entry in _executed(signals.recording, signals.recording.units.index(name)):
+        at = entry.begin if isinstance(entry, Band) else entry.at
+        if at > signals.until:
             break
+        if current is not None and isinstance(entry, Executing | Band):
+            bands.append(Band(current.at, at, current.instruction))
+            current = None
         match entry:
+            case Band():
+                bands.append(entry)
             case Executing():
-                if current is not None:
-                    bands.append(Band(current.at, entry.at, current.instruction))
                 current = entry
             case Finished(at) | Powered(at, False) if current is not None:
                 bands.append(Band(current.at, at, current.instruction))
@@ -141,6 +148,18 @@ def instructions(signals: Signals, name: str) -> list[Band]:
     if current is not None:
         bands.append(Band(current.at, signals.until, current.instruction))
     return bands
+
+
+def _executed(recording: Recording, unit: int) -> Iterator[Entry | Band]:
+    """The entries of a unit; a band for many turns of a loop."""
+    for piece in recording.pieces():
+        if not isinstance(piece, Turns):
+            if piece[0] == unit:
+                yield from piece[1]
+        elif piece.count < MANY_TURNS:
+            yield from piece.of(unit)
+        else:
+            yield from (Band(turn.begins, piece.ends, "") for turn in piece.turns if turn.unit == unit)
 
 
 def powers(driven: Driven, until: Ns) -> list[Band]:

@@ -12,15 +12,19 @@ import numpy.typing as npt
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
-from detent.cell.recording import Recording
+from detent.cell.recording import InputSet, Received, Recording
+from detent.cell.turns import Turns
+from detent.controllers.device import Powered
 from detent.outputs.axis_motion import AxisMotion, Pulses
 from detent.outputs.units import UnitLog, UnitView, views
 from detent.outputs.waves import BEFORE_ALL, UNKNOWN, Wave, merge, serial_wave, wave
 from detent.outputs.windings import Driven, connectors
-from detent.pins import PulseOutput
+from detent.pins import PinSet, PulseOutput
 from detent.pulses.segment import Int64Array
 from detent.ticks import Ns
+from detent.uart import Sent
 
+MOST_CHANGES = 20_000_000  # of outputs, by programs that turn in loops: they are held one by one
 WINDOW = 1 << 14  # pulses of a unit, or changes of a pin, in one window
 LATEST: Ns = (1 << 62) - 1  # later times, or sums of them, int64 does not hold
 
@@ -28,6 +32,7 @@ Watch: TypeAlias = Callable[[int, int], None]
 """Told how much of an output is done, of how much."""
 
 _MOTION = (MotionStarted, MotionCut, MotionEnded)
+_LOGGED = (PinSet, InputSet, Sent, Received, Powered)
 
 
 def nobody_looks(done: int, total: int) -> None:
@@ -60,7 +65,7 @@ def _last_edge(recording: Recording, view: UnitView, now: Ns) -> Ns:
 class Signals:
     """All wires of a recording from 0 up to and including `until`.
 
-    ValueError for a unit without a view, and for a time that int64 cannot hold.
+    ValueError for a unit without a view, for a time that int64 cannot hold, and for too many changes to hold.
     """
 
     def __init__(self, recording: Recording, views: Sequence[UnitView], until: Ns) -> None:
@@ -72,7 +77,8 @@ class Signals:
             raise ValueError(f"no view of {', '.join(missing)}: give a UnitView for every unit that was recorded")
         self.recording, self.until = recording, until
         logs = [UnitLog(by_name[name]) for name in recording.units]
-        for order, (unit, entry) in enumerate(recording):
+        _check_loops(recording)
+        for order, (unit, entry) in enumerate(recording.with_kinds(*_LOGGED)):
             if type(entry) not in _MOTION and entry.at <= until:
                 logs[unit].take(order, entry)
         found: list[UnitSignals] = []
@@ -193,6 +199,17 @@ class UnitSignals:
     def _is_powered(self, times: Int64Array) -> npt.NDArray[np.bool_]:
         states: npt.NDArray[np.bool_] = np.concatenate(([self.view.powered], self._power.levels)).astype(np.bool_)
         return states[np.searchsorted(self._power.times, times, side="right")]
+
+
+def _check_loops(recording: Recording) -> None:
+    """ValueError if programs in loops switch outputs more often than can be held."""
+    for piece in recording.pieces():
+        if isinstance(piece, Turns) and PinSet in piece.kinds and piece.count > MOST_CHANGES:
+            names = ", ".join(recording.units[turn.unit] for turn in piece.turns)
+            raise ValueError(
+                f"there are {piece.count} instructions and changes of outputs by programs in loops ({names}), and "
+                f"{MOST_CHANGES} can be written: run for less"
+            )
 
 
 def _times_on(pin: str, output: PulseOutput, pulses: Pulses) -> Int64Array:

@@ -153,13 +153,13 @@ class Driven:
 
 def connectors(recording: Recording, unit: str) -> list[str]:
     """The connectors of a unit of which a drive was recorded, in the order in which they were first told."""
-    return list(dict.fromkeys(entry.connector for entry in recording.of(unit) if isinstance(entry, DriveSet)))
+    return list(dict.fromkeys(entry.connector for entry in recording.of(unit, DriveSet) if isinstance(entry, DriveSet)))
 
 
 def _settings(recording: Recording, unit: str, connector: str) -> list[Setting]:
     return [
         entry
-        for entry in recording.of(unit)
+        for entry in recording.of(unit, DriveSet, Powered)
         if (isinstance(entry, DriveSet) and entry.connector == connector)
         or (isinstance(entry, Powered) and not entry.on)
     ]

@@ -11,6 +11,7 @@ from typing import Final, TypeVar
 from detent.cell.cell import Cell
 from detent.cell.panel import Front, Panel
 from detent.cell.recording import Entry, Log, Received, Recording
+from detent.cell.turns import Turns
 from detent.controllers.device import Cautioned, Executing, Powered, Refused, StoreImage
 from detent.uart import Sent
 
@@ -75,6 +76,13 @@ class Watch(Recording):
         for entry in entries:
             if watched.tell(entry):
                 self.events.append((unit, entry))  # type: ignore[arg-type]  # those are the ones worth keeping
+
+    def turn(self, turns: Turns[Entry]) -> None:
+        """Programs turned in loops: the last turn of each shows where it is."""
+        if self._passes_on:
+            super().turn(turns)
+        for unit, entry in turns.last():
+            self.of_unit[unit].tell(entry)
 
 
 class RecentLog(Log[T]):

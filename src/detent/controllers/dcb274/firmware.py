@@ -27,7 +27,7 @@ from detent.controllers.dcb274.link import (
     next_name,
 )
 from detent.controllers.dcb274.memory import SIZE, Memory
-from detent.controllers.dcb274.motion import Motion, News
+from detent.controllers.dcb274.motion import SETTLING, Motion, News
 from detent.controllers.dcb274.ports import Ports
 from detent.controllers.dcb274.program import POWER_UP
 from detent.controllers.dcb274.running import Running
@@ -338,6 +338,16 @@ class Dcb274(OneAxis):
         self._quiet = False
         if self._powered and not (self._running.active or self._motion.jogging or self._ports.stopped):
             self._running.go(self._base, False, now)
+
+    def only_its_program(self, now: Ns) -> bool:
+        """At rest, with the current that it has at rest, and nothing is typed, printed or read out."""
+        over = max(self._motion.rested_at + SETTLING, self._transmitter.busy_until) <= now
+        others = min(self._motion.deadline, self._desk.timer, self._transmitter.deadline, self._readout_at)
+        return over and others >= NEVER and self._motion.at_rest and self._running.timer < NEVER
+
+    def postpone(self, by: Ns) -> None:
+        """The program goes on so much later."""
+        self._running.timer += by
 
     def halt(self, now: Ns) -> None:
         """As | (page 25): motion and program are over."""

@@ -18,7 +18,7 @@ from detent.controllers.gsc200.program import Program, ProgramFull
 from detent.controllers.gsc200.running import Running
 from detent.controllers.powered import OneAxis
 from detent.pins import HIGH, LOW, Level, Pin, PinKind, PulseOutput
-from detent.ticks import MS, Ns
+from detent.ticks import MS, NEVER, Ns
 from detent.uart import Char, Format, SerialPort
 
 INSTRUCTION_TIME: Ns = 1 * MS  # our assumption: no loop takes no time, no output pulse has no width
@@ -211,6 +211,15 @@ class GsC200(OneAxis):
         if self._powered and not self._running.busy:
             self._programming = False
             self._running.run(self._ram, now)
+
+    def only_its_program(self, now: Ns) -> bool:
+        """Neither a move, nor the pulse of RESET or a clock, nor an answer is under way."""
+        only = self._transmitter.deadline >= NEVER and self._kept is None and self._transmitter.busy_until <= now
+        return only and self._running.only_its_timer
+
+    def postpone(self, by: Ns) -> None:
+        """The next instruction is reached so much later."""
+        self._running.timer += by
 
     def halt(self, now: Ns) -> None:
         """As K."""

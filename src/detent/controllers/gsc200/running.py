@@ -56,6 +56,11 @@ class Running:
         """Whether the axis seeks the end of travel or home."""
         return self._motion.course in (Course.SEEK_EOT, Course.SEEK_HOME)
 
+    @property
+    def only_its_timer(self) -> bool:
+        """Whether a program runs and waits for nothing but the next instruction, at rest."""
+        return self.timer < NEVER and self._motion.at_rest and self._motion.deadline >= NEVER
+
     def rounds(self) -> list[tuple[int, int]]:
         """The loops that the program is in, outermost first: the address of the L, and which round it is."""
         return self._flow.rounds() if self.busy else []

@@ -32,7 +32,7 @@ def stages(plan: Plan, cell: Cell) -> Mapping[str, Stage]:
 def _commanded(cell: Cell, unit: str, axis: str) -> Stage | None:
     assert cell.recording is not None
     stage = None
-    for entry in cell.recording.of(unit):
+    for entry in cell.recording.of(unit, StageSet, DriveSet):
         if isinstance(entry, (StageSet, DriveSet)) and entry.axis == axis:
             stage = entry.stage if isinstance(entry, StageSet) else entry.drive.stage
     return stage
