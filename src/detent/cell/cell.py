@@ -102,17 +102,23 @@ class Cell:
         """
         if until > self.latest:
             raise ValueError(f"this cell runs to {show_duration(self.latest)} at most, and not to {until} ns")
-        instants, look, most = 0, idling.FIRST, idling.FIRST // idling.PATIENCE
+        instants, look, most = 0, idling.FIRST, idling.LEAST
         while (at := self._next()) <= until:
             self._advance(at)
             instants += 1
             if instants == look:
-                if idling.pass_over(self.circuit, min(until, self._script_deadline), most):
-                    instants, look, most = 0, idling.FIRST, idling.FIRST // idling.PATIENCE
-                else:
-                    # one more: another place of a loop, where it may be that no pulse of an output is on its way
-                    look, most = look + most * idling.PATIENCE + 1, min(2 * most, idling.MOST)
+                instants, (look, most) = 0, self._look_for_loops(until, most)
         self.circuit.now = max(self.now, until)
+
+    def _look_for_loops(self, until: Ns, most: int) -> tuple[int, int]:
+        """Pass over programs that turn in loops of at most `most` instants; when to look again, and for which."""
+        circuit = self.circuit
+        stirred, circuit.stirred = circuit.stirred, False
+        if stirred or idling.pass_over(circuit, min(until, self._script_deadline), most):
+            return idling.FIRST, idling.LEAST
+        most = min(2 * most, idling.MOST)
+        # one more: another place of a loop, where it may be that no pulse of an output is on its way
+        return most * idling.PATIENCE + 1, most
 
     def step(self) -> Ns | None:
         """Let everything of the next eventful instant happen; return it, None if nothing is left to do."""

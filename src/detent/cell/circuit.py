@@ -64,9 +64,11 @@ class Circuit:
         self._driving: set[tuple[int, str]] = set()  # outputs that drive their nets: the others let them float
         self.deadlines: list[Ns] = [NEVER] * len(parts)  # when each part is to be advanced next
         self.line_deadline: Ns = NEVER  # the earliest of all lines
+        self.stirred = False  # a part did something that is more than its own business; whoever looks puts it back
         self._touched: set[int] = set()
         self._instant: Ns = -1
-        self._deliveries: Counter[str] = Counter()  # of this instant, by pin
+        self._deliveries: Counter[tuple[int, str]] = Counter()  # of this instant, by part and pin
+        self._delivered = 0  # how many these are
         wired = [(bool(drives), wiring.names[part] if drives else "") for part, drives in enumerate(wiring.drives)]
         order = sorted(range(len(parts)), key=wired.__getitem__)
         self.turn_of = _Order(map(order.index, range(len(parts))))  # whose turn it is in a round
@@ -80,8 +82,19 @@ class Circuit:
 
     def advance(self, at: Ns) -> None:
         """The deadlines of the parts that are due at `at`, which is now, and what follows from them."""
+        deadlines = self.deadlines
+        earliest = min(deadlines)
+        if earliest > at:
+            return
+        if earliest == at and deadlines.count(at) == 1:  # nearly always
+            index = deadlines.index(at)
+            self.parts[index].advance(at)
+            self._deliver(index, self._drain(index))
+            if self._touched:
+                self._settle()
+            return
         units, contacts = self.wiring.units, False
-        for index, deadline in enumerate(self.deadlines):
+        for index, deadline in enumerate(deadlines):
             if deadline <= at:
                 if index < units:
                     self.parts[index].advance(at)
@@ -131,18 +144,21 @@ class Circuit:
     def _deliver(self, index: int, out: Sequence[Output]) -> None:
         if not out:
             return
-        if index < self.wiring.units and self.recording is not None:
+        if self.recording is not None and index < self.wiring.units:
             self.recording.extend(index, out)
         drives = self.wiring.drives[index]
         for item in out:
             kind = type(item)
+            if kind not in _LEADS_ON:
+                continue
             if kind is PinSet:
                 net = drives.get(item.pin)  # type: ignore[union-attr]
-                if net is not None:
-                    driver = index, item.pin  # type: ignore[union-attr]
-                    begins = driver not in self._driving
-                    self._driving.add(driver)
-                    self._drive(net, driver, item.level, edge=not begins)  # type: ignore[union-attr]
+                if net is None:
+                    continue
+                driver = index, item.pin  # type: ignore[union-attr]
+                begins = driver not in self._driving
+                self._driving.add(driver)
+                self._drive(net, driver, item.level, edge=not begins)  # type: ignore[union-attr]
             elif kind is Sent:
                 place = self.wiring.speaks[index].get(item.port)  # type: ignore[union-attr]
                 if place is not None:
@@ -174,6 +190,8 @@ class Circuit:
                         self._driving.discard((index, pin))
                         self._drive(net, (index, pin), HIGH, edge=False)
 
+            self.stirred = True
+
     def _may_write(self, unit: str) -> bool:
         """Whether a write of the unit's memory that is made now may succeed; a failure is counted."""
         for number, (whose, left) in self.failing_writes.items():
@@ -192,10 +210,10 @@ class Circuit:
     def _set_pin(self, index: int, pin: str, level: Level, *, edge: bool = True) -> None:
         if self._instant != self.now:
             self._instant = self.now
-            self._deliveries.clear()
-        name = f"{self.wiring.names[index]}.{pin}"
-        self._deliveries[name] += 1
-        if self._deliveries.total() > MOST_DELIVERIES:
+            self.another_cause()
+        self._deliveries[index, pin] += 1
+        self._delivered += 1
+        if self._delivered > MOST_DELIVERIES:
             raise self._oscillation()
         if index < self.wiring.units and self.recording is not None:
             self.recording.extend(index, (InputSet(self.now, pin, level),))
@@ -209,14 +227,14 @@ class Circuit:
     def another_cause(self) -> None:
         """What follows in this instant has a cause of its own, outside: its level changes are counted by themselves."""
         self._deliveries.clear()
+        self._delivered = 0
 
     def _oscillation(self) -> Oscillation:
         """The error that names the inputs which change without end, each with the outputs that drive it."""
         names = self.wiring.names
         loops: list[str] = []
-        for name in [name for name, count in self._deliveries.most_common(8) if count > 1]:
-            part, _, pin = name.rpartition(".")
-            net = self.net_read(names.index(part), pin)
+        for part, pin in [where for where, count in self._deliveries.most_common(8) if count > 1]:
+            name, net = f"{names[part]}.{pin}", self.net_read(part, pin)
             drivers = self.nets[net].levels if net is not None else ()
             driven = " and ".join(f"{names[driver]}.{output}" for driver, output in drivers)
             loops.append(f"{name} (driven by {driven})" if driven else name)
@@ -432,3 +450,4 @@ def _as_heard(sent: Sent, form: Format, read: Format) -> Sent:
 
 _ALL = {EVERYBODY}
 _MOTION = (MotionStarted, MotionCut, MotionEnded)
+_LEADS_ON = frozenset((*_MOTION, PinSet, Sent, DriveSet, StageSet, StoreImage, Powered))  # to others, or to an answer

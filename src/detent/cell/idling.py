@@ -17,9 +17,9 @@ from detent.controllers.device import Executing, Looping
 from detent.pins import PinSet
 from detent.ticks import Ns
 
-FIRST = 64  # eventful instants before it is looked for the first time
-MOST = 1 << 14  # of a turn
 PATIENCE = 4  # instants that are run through, for each that a copy may run ahead
+LEAST, MOST = 16, 1 << 14  # instants of a turn: those that are looked for first, and at all
+FIRST = LEAST * PATIENCE  # eventful instants of a cell before it is looked for
 WORTH = 8  # turns that are worth it
 
 

@@ -117,8 +117,9 @@ class GsC200(OneAxis):
             self._read(now)
 
     def _do_due(self, at: Ns) -> None:
-        if self._running.deadline <= at:
-            self._running.advance(at)
+        running = self._running
+        if running.timer <= at or self._motion.deadline <= at:
+            running.advance(at)
         elif self._transmitter.deadline <= at:
             self._transmitter.advance(at)
         elif self._kept is not None:
