@@ -186,10 +186,11 @@ class Transmitter:
     With `timed` false, characters take no time (a link without line timing).
     """
 
-    __slots__ = ("_burst", "_format", "_index", "_out", "_port", "_queue", "_timed", "busy_until", "deadline")
+    __slots__ = ("_baud", "_bits", "_burst", "_index", "_out", "_port", "_queue", "_timed", "busy_until", "deadline")
 
     def __init__(self, port: str, form: Format, out: Outbox, *, timed: bool = True) -> None:
-        self._port, self._format, self._out, self._timed = port, form, out, timed
+        self._port, self._out, self._timed = port, out, timed
+        self._bits, self._baud = form.bits * SECOND, form.baud  # of `Format.duration`
         self._queue: deque[Char] = deque()
         self._burst: Ns = 0  # start of the run of characters sent without a pause
         self._index = 0  # of the next character in the burst
@@ -210,26 +211,31 @@ class Transmitter:
                 self._burst, self._index = now, 0
             self.deadline = max(now, self.busy_until)
         self._queue.extend(characters(data))
-        self.busy_until = self._burst + self._format.duration(self._index + len(self._queue))
+        self.busy_until = self._end(self._index + len(self._queue))
         self.advance(now)
 
     def discard(self) -> None:
         """Drop every character whose start bit has not begun."""
         self._queue.clear()
         self.deadline = NEVER
-        self.busy_until = self._burst + self._format.duration(self._index)
+        self.busy_until = self._end(self._index)
 
     def change(self, form: Format) -> None:
         """Send in another format from now on. No character may be waiting: `discard` them first."""
         if self._queue:
             raise RuntimeError("characters are waiting to be sent: discard them before the format changes")
-        self._burst, self._index, self._format = self.busy_until, 0, form
+        self._burst, self._index = self.busy_until, 0
+        self._bits, self._baud = form.bits * SECOND, form.baud
 
     def advance(self, now: Ns) -> None:
         """Begin the characters that are due up to and including `now`."""
         while self.deadline <= now:
             start = self.deadline
             self._index += 1
-            done = self._burst + self._format.duration(self._index)
+            done = self._end(self._index)
             self._out.append(Sent(start, self._port, self._queue.popleft(), done))
             self.deadline = done if self._queue else NEVER
+
+    def _end(self, characters: int) -> Ns:
+        """When so many characters of the burst have been sent: as `Format.duration` has it, rounded once."""
+        return self._burst + round_ratio(characters * self._bits, self._baud)

@@ -128,8 +128,8 @@ class Cell:
         return at
 
     def _next(self) -> Ns:
-        at = self.circuit.next()
-        return self._script_deadline if self._script_deadline < at else at
+        circuit = self.circuit
+        return min(min(circuit.deadlines), circuit.line_deadline, self._script_deadline)  # nothing is asked more often
 
     def _advance(self, at: Ns) -> None:
         """One instant: the parts' own deadlines, then pins and power, then characters."""

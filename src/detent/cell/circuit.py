@@ -16,7 +16,7 @@ from detent.cell.recording import InputSet, Received, Recording
 from detent.cell.switches import CONTACT
 from detent.cell.wiring import Wiring
 from detent.controllers.device import Device, DriveSet, EdgeSensitive, Output, Powered, StageSet, StoreImage
-from detent.lines.line import EVERYBODY, Line
+from detent.lines.line import EVERYBODY, Arrival, Line
 from detent.pins import HIGH, LOW, Level, Net, PinSet, find_pin
 from detent.ticks import NEVER, Ns
 from detent.uart import Chars, Format, Sent, heard_as
@@ -88,8 +88,13 @@ class Circuit:
             return
         if earliest == at and deadlines.count(at) == 1:  # nearly always
             index = deadlines.index(at)
-            self.parts[index].advance(at)
-            self._deliver(index, self._drain(index))
+            part = self.parts[index]
+            following = part.advance(at)
+            if following is None:
+                following = part.next_deadline()
+            deadlines[index] = NEVER if following is None else following
+            if out := part.drain():
+                self._deliver(index, out)
             if self._touched:
                 self._settle()
             return
@@ -127,12 +132,14 @@ class Circuit:
         while touched:
             if len(touched) == 1:  # nearly always
                 index = touched.pop()
-                self._deliver(index, self._drain(index))
+                if out := self._drain(index):
+                    self._deliver(index, out)
             else:
                 round_ = sorted(touched, key=self.turn_of.__getitem__)
                 touched.clear()
                 for index, out in [(index, self._drain(index)) for index in round_]:
-                    self._deliver(index, out)
+                    if out:
+                        self._deliver(index, out)
 
     def _drain(self, index: int) -> Sequence[Output]:
         """What a part did, and when it wants to be advanced next."""
@@ -142,8 +149,7 @@ class Circuit:
         return part.drain()
 
     def _deliver(self, index: int, out: Sequence[Output]) -> None:
-        if not out:
-            return
+        """Give what a part did, which is something, to the recording and to whomever it leads to."""
         if self.recording is not None and index < self.wiring.units:
             self.recording.extend(index, out)
         drives = self.wiring.drives[index]
@@ -271,33 +277,42 @@ class Circuit:
         for line, units in zip(self.lines, self.wiring.lines, strict=True):
             if line.deadline > at:
                 continue
-            for level in line.strobes(at):
-                for unit, _ in units:
-                    self._set_pin(unit, line.strobe, level)
+            if line.strobe:
+                for level in line.strobes(at):
+                    for unit, _ in units:
+                        self._set_pin(unit, line.strobe, level)
             arrived = line.advance(at)
             if line.started():
                 for unit, port in units:
                     self.parts[unit].set_pin(port, LOW, at)
                     self._touched.add(unit)
-            places = {arrival.place for arrival in arrived}
-            if not places:
-                continue
-            heard = [arrival.sent for arrival in arrived]
-            chars = [sent.char for sent in heard]
-            for place, (unit, port) in enumerate(units):
-                if places != _ALL:  # not everything is for everybody
-                    heard = [arrival.sent for arrival in arrived if arrival.place in (place, EVERYBODY)]
-                    chars = [sent.char for sent in heard]
-                if unit in self._strange:
-                    heard = [_as_heard(sent, line.format, self._strange[unit]) for sent in heard]
-                    chars = [sent.char for sent in heard]
-                if chars:
-                    if self.recording is not None:
-                        self.recording.extend(unit, [Received(s.done, port, s.char, s.at) for s in heard])
-                    self.parts[unit].receive(port, chars, at)
-                    self._touched.add(unit)
+            if arrived:
+                self._arrive(arrived, line, units, at)
         self._plan_lines()
-        self._settle()
+        if self._touched:
+            self._settle()
+
+    def _arrive(self, arrived: Sequence[Arrival], line: Line, units: Sequence[tuple[int, str]], at: Ns) -> None:
+        """Give what has arrived on a line to those units that it is for."""
+        everybody = all(arrival.place == EVERYBODY for arrival in arrived)
+        sent = [arrival.sent for arrival in arrived]
+        chars = [one.char for one in sent]
+        parts, strange, recording, touched = self.parts, self._strange, self.recording, self._touched
+        if everybody and not strange and recording is None:  # 32 axes hear each character of a party line
+            touched.update([unit for unit, port in units if parts[unit].receive(port, chars, at) is not False])
+            return
+        for place, (unit, port) in enumerate(units):
+            if not everybody:
+                sent = [arrival.sent for arrival in arrived if arrival.place in (place, EVERYBODY)]
+                chars = [one.char for one in sent]
+            heard = chars
+            if unit in strange or recording is not None:
+                as_heard = [_as_heard(one, line.format, strange[unit]) for one in sent] if unit in strange else sent
+                heard = [one.char for one in as_heard]
+                if recording is not None and as_heard:
+                    recording.extend(unit, [Received(one.done, port, one.char, one.at) for one in as_heard])
+            if heard and parts[unit].receive(port, heard, at) is not False:
+                touched.add(unit)
 
     # -- what the outside does to it ---------------------------------------------------------------------
 
@@ -448,6 +463,5 @@ def _as_heard(sent: Sent, form: Format, read: Format) -> Sent:
     return sent._replace(char=heard[0] if heard else sent.char._replace(framing_ok=False))
 
 
-_ALL = {EVERYBODY}
 _MOTION = (MotionStarted, MotionCut, MotionEnded)
 _LEADS_ON = frozenset((*_MOTION, PinSet, Sent, DriveSet, StageSet, StoreImage, Powered))  # to others, or to an answer

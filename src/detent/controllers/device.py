@@ -174,8 +174,11 @@ class Device(Protocol):
     def power(self, on: bool, now: Ns) -> None:
         """Switch the supply. Everything volatile is lost; straps are read at the next power-on."""
 
-    def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
-        """Characters whose stop bits end at `now` on the serial input pin `port`."""
+    def receive(self, port: str, chars: Sequence[Char], now: Ns) -> bool | None:
+        """Characters whose stop bits end at `now` on the serial input pin `port`.
+
+        False: they are for others, nothing has come of them, and what it does next is as it was.
+        """
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
         """An input pin takes a level."""
@@ -186,8 +189,11 @@ class Device(Protocol):
     def next_deadline(self) -> Ns | None:
         """When the device wants to be advanced next, if nothing else happens."""
 
-    def advance(self, now: Ns) -> None:
-        """Do everything that is due up to and including `now`, which is never beyond `next_deadline`."""
+    def advance(self, now: Ns) -> Ns | None:
+        """Do everything that is due up to and including `now`, which is never beyond `next_deadline`.
+
+        Returned is the deadline that is next then, NEVER if there is none; None: `next_deadline` has it.
+        """
 
     def drain(self) -> list[Output]:
         """What the device did since the last call, in order: a list that it does not keep."""

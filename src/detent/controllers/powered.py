@@ -46,10 +46,11 @@ class PoweredDevice(ABC):
         deadline = self._next()
         return None if deadline >= NEVER else deadline
 
-    def advance(self, now: Ns) -> None:
-        """Do what is due up to and including `now`, in order of time."""
+    def advance(self, now: Ns) -> Ns:
+        """Do what is due up to and including `now`, in order of time; what is due next."""
         while (at := self._next()) <= now:
             self._do_due(at)
+        return at
 
     def drain(self) -> list[Output]:
         """What the device did since the last call."""

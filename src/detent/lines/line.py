@@ -119,10 +119,16 @@ class Line:
 
     def advance(self, now: Ns) -> list[Arrival]:
         """Deliver what is due: to the host into `heard`; returned is what reaches the units at `now`."""
-        self._host.advance(now)
+        if self._host.deadline <= now:
+            self._host.advance(now)
         if self._from_units:
-            self.heard += [Heard(talking.done, talking.char) for talking in self._from_units if talking.done <= now]
-            self._from_units = [talking for talking in self._from_units if talking.done > now]
+            done = [talking for talking in self._from_units if talking.done <= now]
+            if done:
+                self.heard += [Heard(talking.done, talking.char) for talking in done]
+                self._from_units = [talking for talking in self._from_units if talking.done > now]
+        if not self._on_wire:
+            self._plan()
+            return []
         arrived = [sent for sent in self._on_wire if sent.done - self._early <= now]
         if arrived:
             del self._on_wire[: len(arrived)]

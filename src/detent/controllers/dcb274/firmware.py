@@ -113,13 +113,12 @@ class Dcb274(OneAxis):
         self._desk.reset()
         self._forget()
 
-    def receive(self, port: str, chars: Sequence[Char], now: Ns) -> None:
-        """Characters on RX whose stop bits end at `now`."""
+    def receive(self, port: str, chars: Sequence[Char], now: Ns) -> bool:
+        """Characters on RX whose stop bits end at `now`. False if they are for other axes, and nothing is under way."""
         if self._quiet and len(chars) == 1:
             value, parity_ok, framing_ok = chars[0]
-            entry = self._entry
-            if parity_ok and framing_ok and isinstance(entry, NamedEntry) and entry.skips(value):
-                return
+            if parity_ok and framing_ok and self._entry.skips(value):  # lines have names where it can be quiet
+                return False
         self.advance(now)
         for char in chars:
             if self._powered:
@@ -128,17 +127,18 @@ class Dcb274(OneAxis):
                 self._receive(char.value if sound else 0xFF, now)
                 self._poll(now)
                 self.advance(now)
-        self._rest()
+        self._rest(self._next())
+        return True
 
-    def _rest(self) -> None:
-        """Note whether nothing is under way, so that nothing happens but by an input."""
+    def _rest(self, following: Ns) -> None:
+        """Note whether nothing is under way, so that nothing happens but by an input; `following` is due next."""
         self._quiet = (
-            self.mode is Mode.PARTY
+            following >= NEVER
+            and self.mode is Mode.PARTY
             and self._powered
             and self._desk.stage is Stage.FREE
             and not self._running.active
             and not self._inbox
-            and self._next() >= NEVER
         )
 
     def set_pin(self, pin: str, level: Level, now: Ns) -> None:
@@ -185,13 +185,14 @@ class Dcb274(OneAxis):
             return None
         return deadline
 
-    def advance(self, now: Ns) -> None:
-        """Do what is due, in order of time; in one instant steps come first."""
+    def advance(self, now: Ns) -> Ns:
+        """Do what is due, in order of time; in one instant steps come first. What is due next."""
         if self._quiet:
-            return
+            return NEVER
         while (at := self._next()) <= now:
             self._do_due(at)
-        self._rest()
+        self._rest(at)
+        return at
 
     def _do_due(self, at: Ns) -> None:
         if self._motion.deadline <= at:
@@ -577,7 +578,12 @@ class Dcb274(OneAxis):
         self._readout_at = max(free, self._motion.next_change(now))
 
     def _next(self) -> Ns:
-        """The earliest deadline."""
-        return min(
-            self._motion.deadline, self._running.timer, self._desk.timer, self._transmitter.deadline, self._readout_at
-        )
+        """The earliest deadline; written out, as nothing is asked more often."""
+        at = self._motion.deadline
+        if (timer := self._running.timer) < at:
+            at = timer
+        if (timer := self._desk.timer) < at:
+            at = timer
+        if (character := self._transmitter.deadline) < at:
+            at = character
+        return self._readout_at if self._readout_at < at else at

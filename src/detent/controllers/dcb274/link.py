@@ -71,6 +71,9 @@ class Entry(Protocol):
     def empty(self) -> bool:
         """Whether no command has begun."""
 
+    def skips(self, value: int) -> bool:
+        """Take a character that means nothing to this axis; False, and it is not taken, if it may mean something."""
+
     def feed(self, value: int) -> Entered:
         """Take one character."""
 
@@ -94,6 +97,10 @@ class SingleEntry:
     def empty(self) -> bool:
         """Whether no command has begun."""
         return not self._text
+
+    def skips(self, value: int) -> bool:
+        """None: every character may mean something."""
+        return False
 
     def feed(self, value: int) -> Entered:
         """Take one character."""
@@ -135,6 +142,10 @@ class _Place(Enum):
     MINE = "a line for this axis"
     OTHERS = "a line for somebody else, or one that is not taken"
     TAKEN = "a closed line that was an interrupt"
+
+
+_OTHERS: Final = _Place.OTHERS
+_HEEDED: Final = _SINGLE | {LF}  # in a line for somebody else
 
 
 class NamedEntry:
@@ -195,6 +206,8 @@ class NamedEntry:
         Of 32 axes on a line, 31 do nothing else with nearly every character.
         """
         place = self._place
+        if place is _OTHERS and value not in _HEEDED:
+            return not self._passes
         if self._passes or value in _SINGLE or place is _Place.MINE or place is _Place.TAKEN:
             return False
         if value == LF:
@@ -202,7 +215,7 @@ class NamedEntry:
         elif value == self.name and place is _Place.START:
             return False
         else:
-            self._place = _Place.OTHERS
+            self._place = _OTHERS
         return True
 
     def clear(self) -> None:

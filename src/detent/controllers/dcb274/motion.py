@@ -135,7 +135,12 @@ class Motion:
     @property
     def deadline(self) -> Ns:
         """When something happens by itself."""
-        return min(self._axis.deadline, self._ports.deadline, self._step_due, self._sets_off)
+        at = self._axis.deadline
+        if (output := self._ports.deadline) < at:
+            at = output
+        if self._step_due < at:
+            at = self._step_due
+        return self._sets_off if self._sets_off < at else at
 
     def next_change(self, now: Ns) -> Ns:
         """When the position changes next by itself."""

@@ -126,7 +126,7 @@ class Ports:
     @property
     def deadline(self) -> Ns:
         """When an output changes by itself."""
-        return min(self._rises, self._turns)
+        return self._rises if self._rises < self._turns else self._turns
 
     def advance(self, at: Ns) -> None:
         """The step pulse ends, the direction turns."""
