@@ -24,7 +24,7 @@ def rows() -> list[Row]:
     bare, lost_bare, polls_bare = _party_line("off")
     return [
         Row(f"index of {LONG} steps", long, "us", f"of {SHORT} steps", short, 1.2 * short),
-        Row(f"{AXES} axes polled, 460 800 baud, {polls}/s", 100 * share, "% of a core", "all of it", 100, 100),
+        Row(f"{AXES} axes polled, 460 800 baud, {polls}/s", 100 * share, "% of a core", "all of it", 100, 30),
         Row(f"characters lost in {polls} polls", lost, "", "sent", 3 * polls, 0),
         Row(f"without execution times, {polls_bare}/s", 100 * bare, "% of a core", "all of it", 100, None),
         Row(f"characters lost in {polls_bare} polls", lost_bare, "", "sent", 3 * polls_bare, 0),
