@@ -297,9 +297,9 @@ def _jog(
     for way in ("plus", "minus"):
         if legs and not legs[-1].made:
             break
-        if not json:  # the way is told while the motor turns
-            print(f"  {way:<5} ", end="", flush=True)
         try:
+            if not json:  # the way is told while the motor turns
+                print(f"  {way:<5} ", end="", flush=True)
             legs.append(next(jog))
         except BaseException as error:
             if not json:
