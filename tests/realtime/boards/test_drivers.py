@@ -241,3 +241,28 @@ def test_behind_a_shutdown_a_chip_is_set_again() -> None:
 def test_wires_that_do_not_fit_the_chip(made: DriverSetup, said: str) -> None:
     with pytest.raises(SetupProblem, match=said):
         Bench([(setup(drivers=(made,)), FakePort(FakeBoard()))], start=False)
+
+
+@pytest.mark.parametrize("made", [chip(), chip("tmc2208"), chip("tmc2130"), chip("tmc5160", sense=0.075)])
+@pytest.mark.parametrize("away", [True, False])
+def test_a_chip_whose_supply_was_cut_is_told_and_set_again_when_it_is_commanded(made: DriverSetup, away: bool) -> None:
+    """Released, a mushroom button brings a chip back with a current and microsteps of its own."""
+    real = Chip(made.address)
+    bench = driven(made, real)
+    driver = bench.boards.drivers["slide driver"]
+    driver.command(HALF)
+    bench.run(10 * SECOND)
+    assert bench.of(DriverFault) == []
+    writes = real.writes
+    real.deaf, real.writes, real.registers = away, 0, {0x6C: 0x10410150}  # as it comes up
+    bench.run(3 * SECOND)
+    [fault] = bench.of(DriverFault)
+    assert ("does not answer; look at its supply" if away else "lost its settings: was its supply cut?") in fault.reason
+    assert real.writes == 0, "nothing is set before somebody has looked at the machine"
+    real.deaf = False
+    driver.command(HALF)
+    bench.run(3 * SECOND)
+    assert len(bench.of(DriverSet)) == 2
+    assert len(bench.of(DriverFault)) == 1
+    assert real.writes == writes
+    assert real.registers == {entry.register: entry.value for entry in settings(made, HALF)}

@@ -9,6 +9,7 @@ from tests.realtime.served import no_file
 from detent.cell.description import Problem, parse
 from detent.realtime.boards.drive import RealPins
 from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.chips import Chip
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.states import News
@@ -211,3 +212,36 @@ def test_a_cell_without_pins_says_so() -> None:
 def test_a_pace_of_its_own_is_refused() -> None:
     with pytest.raises(Problem, match="real pins keep real time"):
         made(CELL, pace=2)
+
+
+def test_a_mushroom_button_in_the_supply_of_the_motors_is_told_and_recover_sets_the_chip_again() -> None:
+    driver = 'driver = { kind = "tmc2209", uart = "gpio20", amperes = 0.8, microsteps = 2 }\ninputs ='
+    machine, chip = Machine(axes={"x": MachineAxis("gpio2", "gpio3")}), Chip()
+    fake = FakeBoard(machine, moves=400)
+    fake.chips["gpio20"] = [chip]
+    service, wall, news = made(CELL.replace("inputs =", driver), FakePort(fake))
+    with service:
+        control = Control(service)
+        assert service.driven is not None
+        run(service, wall, 100 * MS)
+        told = dict(chip.registers)
+        control.do("type", {"text": "+30000"})
+        run(service, wall, 400 * MS)
+        chip.deaf = True
+        run(service, wall, 3 * SECOND)
+        [axis] = service.driven.axes()
+        assert (axis.standing.value, axis.known, axis.moving) == ("fault", False, False)
+        assert "does not answer; look at its supply" in axis.why
+        place = machine.axes["x"].position
+        assert axis.shaft == place
+        chip.deaf, chip.writes, chip.registers = False, 0, {}
+        run(service, wall, 3 * SECOND)
+        assert chip.registers == {}
+        control.do("recover", {})
+        run(service, wall, 1 * SECOND)
+        assert service.driven.axes()[0].standing.value == "driven"
+        assert chip.registers == told
+        control.do("type", {"text": "+10"})
+        run(service, wall, 1 * SECOND)
+        assert machine.axes["x"].position == place + 10
+    assert [item.weight.value for item in news if item.weight.value != "note"] == ["fault", "warning"], news

@@ -1,7 +1,8 @@
 """Driver chips: the settings that a controller commands of its power stage, written to registers and read back.
 
 By UART a chip counts the writes that it took whole (IFCNT); by SPI registers are read back. What is not kept is
-written again, and given up after a few times.
+written again, and given up after a few times. Afterwards each chip is asked every second whether it still has them: one
+whose supply was cut comes back with currents and microsteps of its own, and nobody would hear of it.
 """
 
 from collections import deque
@@ -25,8 +26,10 @@ from detent.realtime.boards.registers import (
 )
 from detent.realtime.boards.setup import DriverSetup
 from detent.realtime.pace import WallNs
+from detent.ticks import SECOND
 
 TRIES = 3
+LOOK_EVERY: WallNs = SECOND
 BAUD = 40_000
 SPI_RATE = 1_000_000
 SPI_MODE = 3
@@ -105,6 +108,9 @@ class Driver:
         self._wanted: Sequence[Written] | None = None
         self._fresh = False  # `_wanted` has not been written
         self._busy = self._ready = False
+        self._failed = False  # what it has is not what it was told
+        self._count = 0  # of its writes, by UART, when it was set
+        self._look_at: WallNs | None = None  # whether it still has its settings
 
     def command(self, stage: Stage) -> None:
         """Set the chip as `stage` says, as soon as it can be reached; the last command counts.
@@ -112,7 +118,7 @@ class Driver:
         SetupProblem, before anything is sent, where the chip cannot do it.
         """
         wanted = settings(self.setup, stage)
-        if wanted != self._wanted:
+        if wanted != self._wanted or self._failed:
             self._wanted, self._fresh = wanted, True
 
     def began(self) -> None:
@@ -123,12 +129,57 @@ class Driver:
     def shut_down(self) -> None:
         """The board does not talk to it."""
         self._ready = self._busy = False
+        self._look_at = None
 
     def commit(self, wall: WallNs) -> None:
         """Begin to write what was commanded."""
         if self._fresh and self._ready and not self._busy:
-            self._fresh, self._busy = False, True
+            self._fresh, self._busy, self._look_at = False, True, None
             self._write(TRIES, wall)
+
+    def deadline(self) -> WallNs | None:
+        """When `due` wants to be called."""
+        return self._look_at
+
+    def due(self, wall: WallNs) -> None:
+        """Ask the chip whether it still has its settings, if it is time."""
+        if self._look_at is not None and wall >= self._look_at:
+            self._look_at = None
+            if not self._busy and self._wanted is not None:
+                self._busy = True
+                self._look(TRIES, wall)
+
+    def _look(self, left: int, wall: WallNs) -> None:
+        if self.setup.uart is not None:
+            ask, answer = read_frame(self.setup.address, IFCNT), 8
+        else:
+            ask, answer = bytes((CHOPCONF, 0, 0, 0, 0)), 5
+            self._wire.exchange(ask, answer, lambda *_: None, wall)  # the next one brings what this one asks
+
+        def came(data: bytes, at: WallNs) -> None:
+            if self._kept(data):
+                self._busy, self._look_at = False, at + LOOK_EVERY
+            elif self._fresh:
+                self._busy = False  # it is set anew anyway
+            elif left > 1:
+                self._look(left - 1, at)
+            else:
+                silent = self.setup.uart is not None and read_answer(bytes_of_bits(data), IFCNT) is None
+                silent = silent or not any(data) or all(byte == 0xFF for byte in data)
+                self._fail(self._no_answer() if silent else "it has lost its settings: was its supply cut?")
+
+        self._wire.exchange(ask, answer, came, wall)
+
+    def _kept(self, data: bytes) -> bool:
+        """Whether the answer to a look is that of a chip which has what it was told."""
+        if self.setup.uart is not None:
+            return read_answer(bytes_of_bits(data), IFCNT) == self._count
+        wanted = next(entry.value for entry in self._wanted or () if entry.register == CHOPCONF)
+        return int.from_bytes(data[1:5], "big") == wanted
+
+    def _fail(self, reason: str) -> None:
+        self._busy, self._failed = False, True
+        self._core.events.append(DriverFault(self._core.setup.name, self.name, reason))
 
     @property
     def waiting(self) -> bool:
@@ -157,6 +208,7 @@ class Driver:
                     took = "an unknown number" if now is None else str((now - count) & 0xFF)
                     self._again(left, at, f"it took {took} of {len(wanted)} writes; look at the wire and its resistor")
                 else:
+                    self._count = now
                     self._done(wanted, at)
 
             self._wire.exchange(ask, 8, behind, at)
@@ -199,9 +251,10 @@ class Driver:
             return
         self._busy = False
         if not self._fresh:
-            self._core.events.append(DriverFault(self._core.setup.name, self.name, reason))
+            self._fail(reason)
 
-    def _done(self, wanted: Sequence[Written], _: WallNs) -> None:
-        self._busy = False
+    def _done(self, wanted: Sequence[Written], wall: WallNs) -> None:
+        self._busy = self._failed = False
+        self._look_at = wall + LOOK_EVERY
         what = ", ".join(f"{entry.name} {entry.value:08X}h" for entry in wanted)
         self._core.events.append(DriverSet(self._core.setup.name, self.name, what))

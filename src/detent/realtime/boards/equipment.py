@@ -180,10 +180,11 @@ class Equipment:
         return together(changing)
 
     def deadlines(self) -> list[WallNs | None]:
-        """When watchdogs are to be fed and counts compared."""
+        """When watchdogs are to be fed, counts compared, driver chips looked after."""
         return [
             *(out.deadline() for out in self.outs.values()),
             *(axis.proof_due() for axis in self.steppers.values()),
+            *(driver.deadline() for driver in self.drivers.values()),
         ]
 
     def hungry(self, wall: WallNs) -> bool:
@@ -200,11 +201,13 @@ class Equipment:
         return waits
 
     def due(self, wall: WallNs) -> None:
-        """Compare counts, where it is time."""
+        """Compare counts, and look after driver chips, where it is time."""
         for axis in self.steppers.values():
             at = axis.proof_due()
             if at is not None and wall >= at:
                 axis.prove(wall)
+        for driver in self.drivers.values():
+            driver.due(wall)
 
     def heard(self) -> WallNs | None:
         """Whatever its stops did up to this wall time was told; None: none of them can do anything."""

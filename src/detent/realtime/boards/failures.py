@@ -67,7 +67,7 @@ class Failures(Rollback):
             case DriverFault(_, driver, reason):
                 for ledger in self.ledgers:
                     if ledger.what.driver == driver and ledger.standing is not Standing.FAULT:
-                        self._fault(ledger, f"its driver: {reason}")
+                        self._fault(ledger, f"its driver: {reason}", known=False)
             case DriverSet(_, driver, what):
                 self._say(Weight.NOTE, f"{driver}: {what}")
             case Refusal(board, item, key, text):
@@ -171,9 +171,10 @@ class Failures(Rollback):
         self.past.keep()
 
     def _go_on(self, ledger: AxisLedger, shaft: int) -> None:
+        unsure = "" if ledger.known else "; the motor may have lost steps while it stood"
         ledger.stepper.rewind(shaft)
         self._driven_again(ledger)
-        self._say(Weight.NOTE, f"{ledger.name} goes on at {shaft}")
+        self._say(Weight.WARNING if unsure else Weight.NOTE, f"{ledger.name} goes on at {shaft}{unsure}")
 
     def _driven_again(self, ledger: AxisLedger) -> None:
         ledger.guard.release()
