@@ -115,6 +115,45 @@ def test_what_is_read_is_never_written_over_and_two_outputs_have_two_files(
     assert {name: file.read_bytes() for name, file in names.items() if file.is_file()} == before
 
 
+MOTOR = "motor as1010 --move 200 --supply 24 --overwrite --plot {read}.png"
+TUNE = "tune gs-c200 --motor as1010 --supply 24 --moves 200 --overwrite --map {read}.csv"
+COMPARE = "compare-moves gs-c200 S=1 S=2 --motor as1010 --moves 10 --supply 24 --overwrite --plot {read}.png"
+OWN = "motor {own} --move 200 --supply 24 --overwrite --plot {read}.png"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *(
+            f"{verb} {one} {{read}}"
+            for verb in (MOTOR, TUNE, COMPARE)
+            for one in ("--curve", "--load-by", "--ring-down")
+        ),
+        OWN,
+        "service {cell} --force --output {read}",
+        "run {cell} --force --vcd {read}",
+        "run gs-c200 --program {read} --force --vcd {read}",
+        "table --curve {read} --low 800 --high 9000 --force --hex {read}",
+    ],
+)
+def test_whatever_a_verb_reads_it_does_not_write_over_even_if_it_is_asked_to(
+    line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    suffix = next((ending for ending in (".png", ".csv") if f"{{read}}{ending}" in line), "")
+    read = tmp_path / f"read{suffix}"
+    read.write_text("half steps/s, Nm\n100, 0.2\n1000, 0.1\n" if "{cell}" not in line else "+100\n")
+    (tmp_path / "cell.toml").write_text(f'[units.u]\nmodel = "gs-c200"\nprogram = "{read.name}"\n')
+    (tmp_path / "own.toml").write_text(
+        "resistance = 1.1\ninductance = 3.6e-3\ncurrent = 2.8\ntorque = 1.26\ninertia = 3e-5\n"
+        f"[curve]\nfile = '{read.name}'\nsupply = 48\n"
+    )
+    before = read.read_bytes()
+    names = {"read": read, "cell": tmp_path / "cell.toml", "own": tmp_path / "own.toml"}
+    assert main_quietly(*(word.format(**names) for word in line.replace("{read}" + suffix, "{read}").split())) == 2
+    assert "is read here, and would be lost" in capsys.readouterr().err
+    assert read.read_bytes() == before
+
+
 def test_every_file_that_a_verb_is_given_is_in_the_table() -> None:
     places = {**{verb: place for verb, (place, _) in VERBS.items()},
               "--install-completion": "detent.cli.completing:install"}  # fmt: skip

@@ -84,7 +84,7 @@ def motor(
         Print everything as one line of JSON.
     """
     from detent.cli.endings import asked_wrongly, failed
-    from detent.cli.rig import made, spread_of
+    from detent.cli.rig import made, read_by, spread_of
     from detent.motors.motor import MotorError
 
     try:
@@ -96,7 +96,7 @@ def motor(
             from detent.outputs.files import check_outputs
 
             figures.check(plot)
-            check_outputs([plot], [Path(name)], asked=overwrite, option="--overwrite")
+            check_outputs([plot], read_by(name, rig), asked=overwrite, option="--overwrite")
         of_a_move = {
             "--as": as_, "--vary": vary, "--sensitivity": sensitivity or None, "--start": start, "--slew": slew,
             "--ramp": ramp, "--variants": variants,

@@ -4,6 +4,7 @@
 """
 
 import errno
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -275,6 +276,20 @@ def _ring_down(rig: "Rig", text: str) -> Any:
     if len(numbers) > 2:
         raise MotorError(f"--ring-down {text}: give overshoot and settling time: 0.45,0.03")
     return ring_down.from_overshoot(rig, *numbers)
+
+
+def read_by(name: str, options: RigOptions) -> list[Path]:
+    """Every file that a motor and its options are read from: no output may go there."""
+    from detent.motors import own
+
+    files = [options.curve, options.load_by, None if options.ring_down is None else Path(options.ring_down)]
+    if name.endswith(".toml"):
+        files.append(Path(name))
+        with suppress(OSError, ValueError):  # `made` tells what is wrong with it
+            _, published = own.read(text_of(Path(name)), name)
+            if published is not None and published.file:
+                files.append(Path(name).parent / published.file)
+    return [file for file in files if file is not None]
 
 
 def text_of(file: Path) -> str:

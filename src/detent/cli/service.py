@@ -70,7 +70,7 @@ def service(
         who = user if user is not None else getpass.getuser()
         if not re.fullmatch(r"[a-z_][a-z0-9_-]*\$?", who):
             raise Problem("", "--user", f"{who!r} is no name of a user")
-        check_outputs([output], [Path(cell)], asked=force)
+        check_outputs([output], found.inputs, asked=force)
     except ValueError as problem:
         asked_wrongly(problem)
     remarks = _remarks(found.description, who)

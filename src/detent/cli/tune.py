@@ -101,7 +101,7 @@ def tune(
         Print everything as one line of JSON.
     """
     from detent.cli.endings import asked_wrongly, failed
-    from detent.cli.rig import made, spread_of
+    from detent.cli.rig import made, read_by, spread_of
     from detent.moves.law import winding_of
     from detent.tuner import tune as tuning
     from detent.tuner.spaces import space
@@ -125,7 +125,8 @@ def tune(
         if machine != NO_MACHINE:
             raise ValueError("--witness, --travel and the like are of trials on a machine: say where it is: --on PORT")
         outputs = [*(map_ or []), *([into] if into is not None else [])]
-        _check(outputs, map_ or [], from_, into, overwrite, each_move)
+        read = [*read_by(motor, rig), *([from_] if from_ is not None else [])]
+        _check(outputs, read, map_ or [], from_, into, overwrite, each_move)
         asked, options = moves_of(moves), _options(set_)
         found = made(motor, rig, winding_of(_law(model, options, axis), _step(rig, model)))
         task = Task(model, check_rig(found.rig, found.motor.name), asked, options, axis, spread_of(vary), seed,
@@ -223,7 +224,13 @@ def _step(rig: RigOptions, model: str) -> str | None:
 
 
 def _check(
-    outputs: list[Path], maps: list[Path], from_: Path | None, into: Path | None, overwrite: bool, each: bool
+    outputs: list[Path],
+    read: list[Path],
+    maps: list[Path],
+    from_: Path | None,
+    into: Path | None,
+    overwrite: bool,
+    each: bool,
 ) -> None:
     from detent.cli.rig import text_of
     from detent.outputs import figures
@@ -236,7 +243,7 @@ def _check(
     for path in maps:
         if path.suffix.lower() != ".csv":
             figures.check(path)
-    check_outputs(outputs, [] if from_ is None else [from_], asked=overwrite, option="--overwrite")
+    check_outputs(outputs, read, asked=overwrite, option="--overwrite")
     if from_ is not None and not from_.is_file():
         raise ValueError(f"--from {from_}: there is no such file")
     if from_ is not None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
 from math import floor, isqrt, sqrt
+from operator import attrgetter
 
 from detent.pulses.segment import GUARD, Immutable, check_range
 from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, SECOND, Fixed, Ns
@@ -41,6 +42,9 @@ class Accelerating(Immutable):
     gain_ns: float = field(init=False, repr=False, compare=False)
     slow_ns: float = field(init=False, repr=False, compare=False)
     square_ns: float = field(init=False, repr=False, compare=False)  # slow_ns**2
+    # the instants `low` (up) or `high` (down) steps from the slow end, and of the last pulse (floors)
+    begin: Fixed = field(init=False, repr=False, compare=False)
+    end: Fixed = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.slow < 0 or self.gain <= 0:
@@ -51,6 +55,8 @@ class Accelerating(Immutable):
         made = _constants(slow.numerator, slow.denominator, gain.numerator, gain.denominator)
         for put, value in zip(_PUT_DERIVED, made, strict=True):
             put(self, value)
+        _PUT_BEGIN(self, self.fixed(0))
+        _PUT_END(self, self.fixed(self.high - self.low))
 
     @classmethod
     def down_from(cls, begin: Fixed, slow: Fraction | int, gain: Fraction | int, steps: int) -> "Accelerating":
@@ -66,16 +72,6 @@ class Accelerating(Immutable):
     def steps(self) -> int:
         """How many pulses."""
         return self.high - self.low
-
-    @property
-    def begin(self) -> Fixed:
-        """The instant `low` (up) or `high` (down) steps from the slow end (floor)."""
-        return self.fixed(0)
-
-    @property
-    def end(self) -> Fixed:
-        """The instant of its last pulse (floor)."""
-        return self.fixed(self.high - self.low)
 
     def fixed(self, n: int) -> Fixed:
         """The floor of the instant of pulse n (0: the beginning)."""
@@ -147,11 +143,20 @@ class Accelerating(Immutable):
 
     def moved(self, by: Fixed) -> "Accelerating":
         """The same segment, `by` later."""
-        return Accelerating(self.anchor + by, self.slow, self.gain, self.low, self.high, self.up)
+        moved: Accelerating = object.__new__(Accelerating)
+        for get, put in _COPIED:
+            put(moved, get(self))
+        _PUT_ANCHOR(moved, self.anchor + by)
+        _PUT_BEGIN(moved, self.begin + by)
+        _PUT_END(moved, self.end + by)
+        return moved
 
 
 _DERIVED = ("root_gain", "slow_root", "divisor", "gain_ns", "slow_ns", "square_ns")
-_PUT_DERIVED = tuple(vars(Accelerating)[name].__set__ for name in _DERIVED)
+_SLOTS = vars(Accelerating)
+_PUT_DERIVED = tuple(_SLOTS[name].__set__ for name in _DERIVED)
+_PUT_ANCHOR, _PUT_BEGIN, _PUT_END = (_SLOTS[name].__set__ for name in ("anchor", "begin", "end"))
+_COPIED = tuple((attrgetter(name), _SLOTS[name].__set__) for name in ("slow", "gain", "low", "high", "up", *_DERIVED))
 
 
 @lru_cache(maxsize=256)

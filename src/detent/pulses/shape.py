@@ -21,7 +21,19 @@ SHORT = 1 << 10  # pulses a segment, on average, below which columns are quicker
 class Shape:
     """The segments of a train and their running sums. ValueError for segments that overlap or follow an endless one."""
 
-    __slots__ = ("_columns", "_kept", "before", "begins", "ends", "lasts", "quick", "segments", "steps", "through")
+    __slots__ = (
+        "_asked",
+        "_columns",
+        "_kept",
+        "before",
+        "begins",
+        "ends",
+        "lasts",
+        "quick",
+        "segments",
+        "steps",
+        "through",
+    )
 
     def __init__(self, segments: tuple[AnySegment, ...]) -> None:
         self.segments = segments
@@ -32,6 +44,7 @@ class Shape:
         self.through: list[int] = []  # pulses up to its end
         self.lasts: list[Fixed] = []  # the instant of the last of these
         self.ends: list[Fixed] = []
+        self._asked = False
         self._kept: tuple[Fixed, Int64Array] | None = None
         self._columns: tuple[Fixed, Columns] | None = None
         self.quick: list[Quick | None] | None = None  # of each segment, once `make_quick` was called
@@ -82,9 +95,9 @@ class Shape:
             return
         whole, rest = start >> FIXED_BITS, start & (ONE_NS - 1)
         kept = self._kept
-        if kept is None and len(out) == self.steps:
+        if not self._asked and len(out) == self.steps:
+            self._asked = True  # whoever comes a second time will come again
             self._fill(out, first, start)
-            self._kept = -1, out[:0]  # whoever comes a second time will come again
             return
         import numpy as np
 

@@ -41,25 +41,40 @@ def move(start_stop: int, slew: int, ramp: int, steps: int | None) -> Move:
         return Move(Train(()), 0, 0)
     if slew <= start_stop:
         return Move(Train((Uniform.at_rate(0, slew, steps),)), 0, 0)
-    gain = Fraction(slew * slew - start_stop * start_stop, ramp)
     up = ramp if steps is None else min(ramp, steps // 2)
     segments: list[AnySegment] = []
     now: Fixed = 0
     if up:
-        segments.append(Accelerating(0, start_stop, gain, 0, up))
-        now = segments[0].fixed(up)
+        rising, falling = _ramps(start_stop, slew, ramp, up)
+        segments.append(rising)
+        now = rising.end
     if steps is None:
         return Move(Train((*segments, Uniform.at_rate(now, slew, None))), up, 0)
     if steps > 2 * up:
         if up == ramp:
             middle = Uniform.at_rate(now, slew, steps - 2 * up)
         else:
-            middle = Uniform.fixed_period(now, _period(start_stop, gain, up), 1)
+            middle = Uniform.fixed_period(now, _period(start_stop, _gain(start_stop, slew, ramp), up), 1)
         segments.append(middle)
         now = middle.fixed(steps - 2 * up)
     if up:
-        segments.append(Accelerating.down_from(now, start_stop, gain, up))
+        segments.append(falling.moved(now))
     return Move(Train(segments), up, up)
+
+
+@lru_cache(maxsize=256)
+def _ramps(start_stop: int, slew: int, ramp: int, up: int) -> tuple[Accelerating, Accelerating]:
+    """The first `up` steps of a ramp, from instant 0 on, and the same down, which begins at instant 0.
+
+    The same settings come again with other distances: only the instant of the ramp down differs then.
+    """
+    gain = _gain(start_stop, slew, ramp)
+    return Accelerating(0, start_stop, gain, 0, up), Accelerating.down_from(0, start_stop, gain, up)
+
+
+def _gain(start_stop: int, slew: int, ramp: int) -> Fraction:
+    """What each step of the ramp adds to the square of the speed."""
+    return Fraction(slew * slew - start_stop * start_stop, ramp)
 
 
 def _period(start_stop: int, gain: Fraction, n: int) -> Fixed:
