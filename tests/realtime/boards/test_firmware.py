@@ -126,7 +126,7 @@ class Host:
             boards.receive(descriptor, wall)
         for descriptor in writable:
             boards.flush(descriptor, wall)
-        boards.due(wall)
+        boards.due(wall, self.machine.wall)
         self.events += boards.events()
         if self.aligned:
             wall = self.machine.wall()
@@ -138,7 +138,7 @@ class Host:
             self.told.clear()
             at = boards.commit_at()
             if at is not None and at <= wall:
-                boards.commit(self.now, wall)
+                boards.commit(self.now, wall, self.machine.wall)
             self.events += boards.events()
         self.busy += time.thread_time_ns() - began
 

@@ -153,6 +153,12 @@ def test_whatever_is_said_and_pressed_nothing_is_lost_in_many_sessions(kind: str
     assert sum(session(kind, seed) for seed in range(100, 200)) > 30
 
 
+@pytest.mark.parametrize("seed", [132, 165])
+def test_sessions_that_lost_something_once(seed: int) -> None:
+    """A stop of two axes of which one was sent for later, when the input was over; and what came of it."""
+    session("bs0610", seed)
+
+
 @pytest.mark.parametrize("late", [0, 60])
 def test_an_input_that_stops_two_axes_stops_both_and_each_count_is_the_boards(late: int) -> None:
     """A reset in mid-move of both motors: two triggers fire, and the cell is taken back for the first of them."""

@@ -89,13 +89,17 @@ def test_arming_late_holds_the_pulses_back() -> None:
     assert made.of(Stopped)[0].shaft == made.machine.axes["slide"].position == 0
 
 
-def test_a_stop_for_what_follows_stops_nothing_of_what_was_before_however_late_its_pulses_are() -> None:
-    """EOT is at its level when it is armed, and pulses of the motion before have yet to leave: they leave first."""
+@pytest.mark.parametrize("more", [0, 137 * US, 500 * US, 999 * US, 1001 * US])
+def test_a_stop_for_what_follows_stops_nothing_of_what_was_before_however_late_its_pulses_are(more: int) -> None:
+    """EOT is at its level when it is armed, and pulses of the motion before have yet to leave: they leave first.
+
+    Also the pulse of the very instant at which the next motion begins.
+    """
     made = bench(MachineSwitch("slide", "gpio10", -(1 << 30), 1 << 30, inside=False))
     made.move(constant_acceleration.move(1000, 1000, 1, None).train, 1)
     made.run(50 * MS)
     made.turn(made.wall + 60 * MS)
-    made.run(10 * MS)
+    made.run(10 * MS + more)
     assert made.boards.steppers["slide"].lag > 30 * MS
     axis = made.axes["slide"]
     axis.cut(made.now)

@@ -14,7 +14,7 @@ from detent.realtime.boards.core import Core
 from detent.realtime.boards.dictionary import BARE, Dictionary, Message
 from detent.realtime.boards.equipment import Equipment
 from detent.realtime.boards.events import Lost, Ready, Recovered, Refusal, ShutDown
-from detent.realtime.boards.frames import FrameError
+from detent.realtime.boards.frames import ROOM, FrameError
 from detent.realtime.boards.outs import DigitalOut
 from detent.realtime.boards.probes import Probes
 from detent.realtime.boards.setup import BoardSetup
@@ -24,7 +24,7 @@ from detent.ticks import MS, SECOND, Ns
 
 PIECE = 40  # bytes of the dictionary in one answer
 NO_ANSWER: WallNs = 5 * SECOND  # at the start
-ATTEMPTS = 4  # to make a batch before it is stale
+RUNS = (1 << 30, 8, 2, 1, 1)  # of steps, at most: a batch that has gone stale is made anew, and shorter
 DYING: WallNs = 700 * MS  # what a host before us has queued is over by then
 
 
@@ -204,26 +204,33 @@ class Board:
         self._equipment.talk(wall)
         self._give(partial(self._equipment.commit, now), wall, clock)
 
-    def _give(self, work: Callable[[WallNs], bool], wall: WallNs, clock: Callable[[], WallNs] | None) -> None:
-        """Do `work`, which says things that have a time, until it was quick enough; it tells whether it waits."""
-        link, patience = self.core.link, self.setup.margin // 2
+    def _give(self, work: Callable[[WallNs, int], bool], wall: WallNs, clock: Callable[[], WallNs] | None) -> None:
+        """Do `work`, which says things that have a time, until it was quick enough; it tells whether it waits.
+
+        Each time it is asked for less. What is stale even then is left for the next time.
+        """
+        core, link = self.core, self.core.link
         link.flush(wall)
-        for _ in range(1 if clock is None else ATTEMPTS):
+        waits = False
+        for most in RUNS:
             undo = None if clock is None else self._equipment.kept(wall)
-            waits = work(wall)
+            core.earliest = None
+            waits = work(wall, most)
             link.flush(wall)
             if clock is None or undo is None:
                 break
             after = clock()
-            if after - wall <= patience:
+            if not core.stale(after):
                 break
             undo()
             wall = after
-        else:
-            waits = work(wall)  # this computer is too slow for its margin, and does what it can
-            link.flush(wall)
         if waits:
             self.inquire(wall)
+
+    @property
+    def starving(self) -> bool:
+        """Whether steps have waited for room on the wire, and there is room again."""
+        return self.state is State.READY and self._equipment.starved and self.core.link.spare >= ROOM
 
     def heard(self) -> WallNs | None:
         """Whatever its stops did up to this wall time was told; None: none of them can do anything."""

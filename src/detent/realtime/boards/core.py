@@ -81,6 +81,7 @@ class Core:
         self.events: list[Event] = []
         self.scale = Scale(1)  # cell time to ticks at the pins: the lead is in it
         self.slips = 0
+        self.earliest: int | None = None  # of the ticks for which something was said since this was None
         self._questions: dict[tuple[str, int], _Question] = {}
 
     @property
@@ -103,6 +104,16 @@ class Core:
     def whole(self, message: Message, field: str, wall: WallNs) -> int:
         """A clock in a message, of which 32 bits came, as a whole count."""
         return nearest(message.number(field), self.clock.tick_at(wall))
+
+    def comes(self, tick: int) -> None:
+        """What is said now is for that tick, and has to be there before."""
+        if self.earliest is None or tick < self.earliest:
+            self.earliest = tick
+
+    def stale(self, wall: WallNs) -> bool:
+        """Whether something of what was said, and has not left, would be too late if it left at `wall`."""
+        least = self.clock.tick_at(wall) + self.ticks(self.setup.margin // 2)
+        return self.earliest is not None and self.earliest < least
 
     def command(self, name: str, **values: Value) -> None:
         """Queue a command."""

@@ -41,6 +41,7 @@ class Equipment:
                     stoppers.setdefault(entry.name, mine[entry.name][1])
             self.stops[stepper.name] = Stop(core, axis, self._oid(), mine, self._heard)
         self.inputs = Inputs(core, setup.inputs, stoppers, self.stops, self._oid)
+        self.starved = False  # steps had to wait for room on the wire
         self.outs = {out.name: DigitalOut(core, out, self._oid()) for out in setup.outs}
         self._wires: dict[tuple[str, str], Wire] = {}
         self.drivers = {chip.name: Driver(core, chip, self._wire(chip)) for chip in setup.drivers}
@@ -125,26 +126,25 @@ class Equipment:
         for driver in self.drivers.values():
             driver.shut_down()
 
-    def commit(self, now: Ns, wall: WallNs) -> bool:
-        """The cell is at `now`: send what is certain. Whether an output waits until stops were heard of."""
+    def commit(self, now: Ns, wall: WallNs, most: int) -> bool:
+        """The cell is at `now`: send what is certain, `most` runs of steps.
+
+        Whether an output waits until stops were heard of.
+        """
         waits, heard = False, self.heard()
         for out in self.outs.values():
             if out.wants(wall):
                 waits |= out.commit(wall, heard)
-        link, unarmed = self._core.link, set[str]()
         for name, stop in self.stops.items():
             if stop.pending:
-                if link.spare < stop.bytes_to_say and not link.idle:
-                    unarmed.add(name)  # and no pulse leaves before it
-                    continue
                 settle([axis for axis in self.steppers.values() if axis.of is self.steppers[name].of], now, wall)
                 stop.commit(wall)
         settle(self.steppers.values(), now, wall)
-        self._send([axis for name, axis in self.steppers.items() if name not in unarmed], now, wall)
+        self._send(tuple(self.steppers.values()), now, wall, most)
         return waits
 
-    def _send(self, axes: Sequence[Stepper], now: Ns, wall: WallNs) -> None:
-        """Their pulses, those first that are due first, as far as nothing has to wait for an acknowledgement.
+    def _send(self, axes: Sequence[Stepper], now: Ns, wall: WallNs, most: int) -> None:
+        """Their pulses in `most` runs, those first that are due first, and none that would wait for an acknowledgement.
 
         What would have to is made when it has come: it might be late by then.
         """
@@ -155,13 +155,15 @@ class Equipment:
             if due is not None:
                 turns.append((due, number, runs))
         heapify(turns)
-        while turns and self._core.link.spare >= ONE_RUN:
+        while turns and most and self._core.link.spare >= ONE_RUN:
+            most -= 1
             _, number, runs = turns[0]
             due = next(runs, None)
             if due is None:
                 heappop(turns)
             else:
                 heapreplace(turns, (due, number, runs))
+        self.starved = bool(turns)
 
     def talk(self, wall: WallNs) -> None:
         """Begin to write to driver chips what was commanded: that has no time of its own."""
@@ -191,7 +193,7 @@ class Equipment:
         """Whether a watchdog wants to be fed."""
         return any(at is not None and wall >= at for at in (out.deadline() for out in self.outs.values()))
 
-    def feed(self, wall: WallNs) -> bool:
+    def feed(self, wall: WallNs, _: int) -> bool:
         """Feed watchdogs. Whether an output waits until stops were heard of."""
         waits, heard = False, self.heard()
         for out in self.outs.values():

@@ -135,6 +135,7 @@ class DigitalOut:
             self._again_at = wall + RETRY
             return False
         tick = max(tick, soonest, self._last_tick + 1)
+        core.comes(tick)
         core.command("queue_digital_out", oid=self.oid, clock=tick & MASK,
                      on_ticks=int(level is not self.setup.pin.active_low))  # fmt: skip
         core.queue.take(self.oid, tick)

@@ -197,6 +197,7 @@ class Rollback(Outgoing):
                 if new != old[ledger.name] and ledger.guard.armed.get(event.input) == int(event.level):
                     ledger.awaits = event.input, self._wall()
                     ledger.stepper.halt()
+                    self.boards.stops[ledger.name].now()  # what it was sent for later, when the input may be over
                     continue
                 lost = ledger.tell_difference(old[ledger.name], new, now)
                 if lost:
@@ -228,16 +229,24 @@ class Rollback(Outgoing):
 
         The two are looked at one after the other, and one may be later than the other: some steps may be between.
         """
-        ledger.awaits = None
+        waited, ledger.awaits = ledger.awaits, None
         ledger.guard.fired()
         ledger.stops += 1
-        if ledger.motion is not None:
-            self._fault(ledger, f"{event.input} has stopped it, and it moves on in the cell")
-        if event.shaft != ledger.shaft_at(self.cell.now):
+        motion, here = ledger.motion, ledger.shaft_at(self.cell.now)
+        if motion is not None and event.shaft != motion.shaft:
+            name = event.input or (waited[0] if waited else "an input")
+            self._fault(ledger, f"{name} has stopped it, and it moves on in the cell")
+            motion, here = None, ledger.shaft_at(self.cell.now)
+        if motion is None and event.shaft != here:
+            if abs(event.shaft - here) > 1:
+                what = f"{event.shaft - here:+d} steps that had left when a stop was told are counted all the same"
+                self._say(Weight.WARNING, f"{ledger.name}: {what}")
             self._place(ledger, event.shaft)
             self.past.clear()  # nobody goes back to before that
             self.past.keep()
         ledger.stepper.rewind(event.shaft)
+        if motion is not None:
+            ledger.stepper.tell(motion)
         self._arm()
         self._pending = True
 

@@ -202,6 +202,11 @@ class Boards:
                 times.append(0)
         return max(min(times), self._committed + self.batch) if times else None
 
+    @property
+    def starving(self) -> bool:
+        """Whether `commit` is wanted at once, sooner than a batch: what waited for room on the wire has it again."""
+        return any(board.starving for board, _ in self._pairs)
+
     def heard(self) -> WallNs | None:
         """Whatever stops did up to this wall time was told; None: none can do anything."""
         return min((at for board, _ in self._pairs if (at := board.heard()) is not None), default=None)

@@ -34,6 +34,8 @@ class _Span:
     last: int | None
     direction: int
     shaft: int  # at pulse 0
+    anew: bool  # a motion of its own: what was before is over
+    not_before: int  # no pulse of it up to this tick: a stop is not in force yet
 
 
 class _Channel:
@@ -158,6 +160,19 @@ class Stepper:
         """Its next pulse comes a lead behind the cell again, whatever the last one did, which may be under way."""
         self._trail, self._own = (self.told_through or 0, self.behind(now)), 0
 
+    def over_by(self, at: Ns) -> int | None:
+        """The tick by which every pulse of the motions has come that were over at cell time `at`, where one began then.
+
+        None: the motion in force goes on from before, or nobody knows of one before it.
+        """
+        if not self._spans or not self._spans[-1].anew or self._spans[-1].train is (self._through or (None,))[0]:
+            return None
+        ticks = [channel.last for channel in self._channels if channel.last is not None]
+        error = 0 if self._core.setup.error == "exact" else self._core.ticks(self._core.setup.error)
+        ends = [span.train.time_of(span.last) for span in list(self._spans)[:-1] if span.last is not None]
+        ticks += [self.tick(end) + error for end in ends if end <= at]
+        return max(ticks, default=None)
+
     def tick(self, at: Ns) -> int:
         """The tick at which leaves what the axis does at cell time `at`, with the lag that it has now."""
         return self._core.scale.later(self._core.ticks(self.lag)).tick(at)
@@ -187,7 +202,9 @@ class Stepper:
         following = max(entry.first, (self._told - entry.shaft) * entry.direction + 1)
         if following == 1 and not self._spans:
             self._rested(entry.train, entry.at)
-        self._spans.append(_Span(entry.train, following, None, entry.direction, entry.shaft))
+        self._spans.append(
+            _Span(entry.train, following, None, entry.direction, entry.shaft, entry.first == 1, self._not_before)
+        )
 
     def _close(self, last: int) -> None:
         """The train under way ends with pulse `last`."""
@@ -259,8 +276,10 @@ class Stepper:
         if error != "exact":
             tick -= core.ticks(error)
         soonest = core.soonest(wall)
-        late = max(soonest, self._not_before + 1) - tick
         slip = soonest > tick and not self._regaining
+        if slip:  # there is a hole in the train anyway: what follows it is not in haste, too
+            soonest = max(soonest, core.clock.tick_at(wall) + core.ticks(core.setup.lead // 2))
+        late = max(soonest, span.not_before + 1) - tick
         self._regaining = False
         return None if late <= 0 else Late(-(-late * SECOND // core.frequency), slip)
 
@@ -290,6 +309,8 @@ class Stepper:
                 return
             self._spans.popleft()
             self._runs = None
+            if self._spans and self._spans[0].not_before > present:
+                return  # its pulses may have to be made later first
 
     def _channel(self, direction: int) -> _Channel:
         return self._channels[-1] if direction < 0 else self._channels[0]
@@ -358,6 +379,7 @@ class Stepper:
             core.command("set_next_step_dir", oid=channel.oid, dir=int(up))
             channel.up = up
         rest: Run | None = run
+        core.comes(run.tick(1))
         if channel.last is None:
             core.command("reset_step_clock", oid=channel.oid, clock=run.base & MASK)
         elif run.base != channel.last:
@@ -371,8 +393,10 @@ class Stepper:
         channel.last = run.last
 
     def not_before(self, tick: int) -> None:
-        """No pulse at or before `tick`: a stop comes into force then."""
+        """No pulse of the newest motion at or before `tick`: a stop comes into force then."""
         self._not_before = max(self._not_before, tick)
+        if self._spans:
+            self._spans[-1].not_before = self._not_before
 
     # -- what the firmware does
 

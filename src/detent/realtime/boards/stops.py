@@ -17,7 +17,7 @@ from detent.realtime.boards.stepper import Stepper
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, Ns
 
-BEGINNING, ONE_INPUT = 40, 36  # bytes of messages at most: of a trigger that begins, and of an input
+BY_THE_HOST = 255  # a reason that no input has
 REPORT: Ns = 25 * MS  # of a trigger that is alive
 
 
@@ -76,11 +76,6 @@ class Stop:
         return bool(self._changes)
 
     @property
-    def bytes_to_say(self) -> int:
-        """The messages of what is pending take so many bytes at most."""
-        return BEGINNING + ONE_INPUT * sum(1 + len(inputs) for inputs, _ in self._changes)
-
-    @property
     def firing(self) -> bool:
         """Whether it has fired, and its event is not made yet."""
         return self._firing is not None
@@ -112,6 +107,13 @@ class Stop:
         """Nothing stops the stepper any more. A trigger that is on its way already still comes as an event."""
         self.arm({}, 0)
 
+    def now(self) -> None:
+        """Stop the stepper at once, as an input would: where it has been stopped already, nothing happens to it.
+
+        Its event follows; without an input, if none has stopped it before.
+        """
+        self._core.command("trsync_trigger", oid=self.oid, reason=BY_THE_HOST)
+
     def commit(self, wall: WallNs) -> None:
         """Send what has changed."""
         changes, self._changes = self._changes, []
@@ -134,6 +136,7 @@ class Stop:
         self._quieting = 0
         if not self._alive:
             report = core.unhurried(wall)
+            core.comes(report)
             core.command("trsync_start", oid=self.oid, report_clock=report & MASK, report_ticks=core.ticks(REPORT),
                          expire_reason=0)  # fmt: skip
             for oid in self._axis.oids:
@@ -150,7 +153,9 @@ class Stop:
         # its verdict on the level is there before the first pulse
         verdict = sample * setup.samples
         wanted = self._axis.tick(at) - verdict
-        clock = max(wanted, core.soonest(wall))
+        before = self._axis.over_by(at)  # a pulse of the very instant at which this motion began is none of its own
+        clock = max(wanted, core.soonest(wall), wanted if before is None else before + 1)
+        core.comes(clock)
         core.command(
             "endstop_home", oid=watched.oid, clock=clock & MASK, sample_ticks=sample, sample_count=setup.samples,
             rest_ticks=sample, pin_value=int(level is not setup.pin.active_low), trsync_oid=self.oid,

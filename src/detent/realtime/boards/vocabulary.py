@@ -39,6 +39,7 @@ OF_STEPPERS: Words = {
     "stepper_stop_on_trigger": ("oid", "trsync_oid"),
     "config_trsync": ("oid",),
     "trsync_start": ("oid", "report_clock", "report_ticks", "expire_reason"),
+    "trsync_trigger": ("oid", "reason"),
     "trsync_state": ("oid", "can_trigger", "trigger_reason", "clock"),
     "endstop_home": (
         "oid", "clock", "sample_ticks", "sample_count", "rest_ticks", "pin_value", "trsync_oid", "trigger_reason",
