@@ -159,6 +159,20 @@ def test_what_no_waiting_mends_ends_it() -> None:
         serve._wait({}, opened, Notifier({}))  # type: ignore[arg-type]
 
 
+def test_one_that_waits_is_ended_without_a_failure(
+    cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [sys.executable, "-m", "detent", "serve", str(cell), "--real", "--wait", "--state", str(tmp_path / "state")]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as served:
+        assert served.stderr is not None
+        told = served.stderr.readline()
+        served.send_signal(signal.SIGTERM)
+        assert served.wait(60) == 143
+        assert served.stderr.read() == ""
+    assert f"waiting for {BY_ID}/usb-Klipper_rp2040_1-if00 (boards.pico.serial)" in told
+    assert "SuccessExitStatus=143" in run(capsys, "service", str(cell))[1].splitlines()
+
+
 def test_serve_is_ready_is_alive_and_says_when_it_stops(tmp_path: Path) -> None:
     at = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     at.bind(str(tmp_path / "notify"))

@@ -127,6 +127,8 @@ Restart=on-failure
 RestartSec=2
 # wrongly asked (a cell file that cannot be): trying again does not help
 RestartPreventExitStatus=2
+# ended while it waited for something to be plugged in
+SuccessExitStatus=143
 TimeoutStopSec=10
 # EEPROM images, in /var/lib/{name}
 StateDirectory={name}
