@@ -3,6 +3,7 @@
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.cell.cells import cell, edges, places
+from tests.generated import examples
 
 from detent.axis import Axis
 from detent.cell.recording import InputSet
@@ -176,7 +177,7 @@ EVENTS = st.lists(
 )
 
 
-@settings(max_examples=250, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(250), deadline=None, suppress_health_check=list(HealthCheck))
 @given(
     EVENTS,
     st.none() | st.integers(-12, 12),

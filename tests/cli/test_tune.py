@@ -112,11 +112,11 @@ def test_a_batch_answers_row_by_row_and_a_row_without_answer_says_why(
 ) -> None:
     rows = tmp_path / "machines.csv"
     rows.write_text("inertia,friction,moves\n1.5e-5,0.02,60\n1.5e-5,0.7,60\n")
-    words = ["tune", "gs-c200", "--batch", str(rows), "--motor", "qsh4218-41-10-035", "--variants", "64",
+    words = ["tune", "gs-c200", "--batch", str(rows), "--motor", "qsh4218-41-10-035", "--variants", "32",
              "--no-corners", "--no-gpu"]  # fmt: skip
     found, none = [json.loads(line) for line in run(capsys, *words, "--json").splitlines()]
     assert found["given"] == {"inertia": "1.5e-5", "friction": "0.02", "moves": "60"}
-    assert (found["lost"], found["of"], found["problem"]) == (0, 64, "")
+    assert (found["lost"], found["of"], found["problem"]) == (0, 32, "")
     assert [line[0] for line in found["commands"]] == ["S", "T", "R"]
     assert "does not turn this load" in none["problem"]
     table = list(csv.DictReader(run(capsys, *words).splitlines()))

@@ -8,6 +8,7 @@ from tests.controllers.conformance import Candidate, schedules
 from tests.controllers.genstepper import inputs as genstepper
 from tests.controllers.gsc200 import inputs
 from tests.controllers.supersigma import inputs as supersigma
+from tests.generated import examples
 
 from detent.cell.detector import StepDetector
 from detent.cell.switches import Switch
@@ -16,7 +17,7 @@ CANDIDATES = (*inputs.CANDIDATES, *genstepper.CANDIDATES, *supersigma.CANDIDATES
               Candidate("step detector", StepDetector, None, ["CLOCK"]),
               Candidate("switch", lambda: Switch(1), None, ["SET"]))  # fmt: skip
 
-FAST = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+FAST = settings(max_examples=examples(100), deadline=None, suppress_health_check=list(HealthCheck))
 THOROUGH = settings(max_examples=700, deadline=None, suppress_health_check=list(HealthCheck))
 
 every_candidate = pytest.mark.parametrize("candidate", CANDIDATES, ids=[candidate.name for candidate in CANDIDATES])

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.hosts.interpolation import BOOKED, CLOCK_HZ, EXCHANGE, LATE, MESSAGE, Run, line, order_of, period, together
 
@@ -59,7 +60,7 @@ def check_bus(distances: Sequence[int], fastest: int) -> None:
 
 
 @given(DISTANCES, st.integers(1, 12), st.sampled_from([0, 0, LATE]))
-@settings(max_examples=120)
+@settings(max_examples=examples(120))
 def test_no_axis_is_ever_a_step_off_the_line_in_pulses(distances: list[int], fastest: int, late: int) -> None:
     check(distances, fastest, late)
     check_bus(distances, fastest)

@@ -187,6 +187,7 @@ for one in (steady, changing):
 
 
 @compiled_only
+@pytest.mark.slow
 def test_variants_on_a_gpu_are_those_of_a_processor_in_the_cuda_simulator() -> None:
     """A thread a variant, with a steady load and one that changes with the place; moves that are made, and lost."""
     done = subprocess.run(

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.pulses import Accelerating, State, Table, Ticked, Train, Uniform, arrays
 from detent.ticks import HALF_NS, ONE_NS, SECOND, to_fixed
@@ -323,7 +324,7 @@ def test_numpy_and_numba_and_the_exact_law_give_the_same_times(law):
 
 
 @given(st.integers(1, 9 * 10**9), st.integers(1, 10**7), st.integers(0, 10**9), st.integers(0, 2 * ONE_NS))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_long_runs_at_constant_speed_are_exact_in_arrays(numerator, denominator, first, start):
     train = Train((Uniform(0, numerator, denominator, None),), start)
     times = train.times(first + 1, first + 40_000)

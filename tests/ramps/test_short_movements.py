@@ -1,9 +1,12 @@
 """Short movements three ways (Cassinis, "Short movements", figures 10 and 11, "Experimental results")."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.ramps.curves import linear
 from detent.ramps.differences import PAPER, Differences, compiled
@@ -13,6 +16,11 @@ from detent.ramps.ways import Way
 
 ENTRIES = 232
 OTHER = compiled(linear(1000, 8000, 0.2), 0.2)
+
+
+def slowly(*values: int) -> list[Any]:
+    """Parameters of the slow tests."""
+    return [pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
 def seconds(steps: int, way: Way, table: Differences = PAPER) -> float:
@@ -46,7 +54,7 @@ def test_below_404_half_steps_constant_speed_wins() -> None:
         assert choose(PAPER, 404, 10, way, ENTRIES).entries == ENTRIES
 
 
-@pytest.mark.parametrize("steps", [404, 405, 700, 1000, 2222, 4000, 5143])
+@pytest.mark.parametrize("steps", [404, *slowly(405, 700, 1000, 2222, 4000), 5143])
 def test_the_exact_way_is_the_best_of_the_whole_family(steps: int) -> None:
     found = [constant(3076, steps).clocks]
     for first in range(3076, 6100):
@@ -56,9 +64,10 @@ def test_the_exact_way_is_the_best_of_the_whole_family(steps: int) -> None:
     assert movement(PAPER, steps, 10, Way.EXACT, ENTRIES).clocks == min(found)
 
 
-def test_the_exact_way_gains_14_ms_on_average_and_24_at_most_of_about_610() -> None:
+@pytest.mark.parametrize("stride", [49, *slowly(7)])
+def test_the_exact_way_gains_14_ms_on_average_and_24_at_most_of_about_610(stride: int) -> None:
     hyperbolic, exact = (
-        np.array([movement(PAPER, steps, 10, way, ENTRIES).clocks for steps in range(404, 5144, 7)]) / 2e3
+        np.array([movement(PAPER, steps, 10, way, ENTRIES).clocks for steps in range(404, 5144, stride)]) / 2e3
         for way in (Way.HYPERBOLA, Way.EXACT)
     )
     gain = hyperbolic - exact
@@ -109,7 +118,7 @@ TABLES = st.builds(
 )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(
     TABLES, st.lists(st.integers(1, 1200), min_size=1, max_size=4), st.sampled_from(Way), st.integers(4, 12), st.data()
 )

@@ -5,6 +5,7 @@ import random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 from tests.ramps import clockwork
 
 from detent.ramps.differences import PAPER
@@ -111,7 +112,7 @@ MOVEMENTS = st.one_of(
 )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=examples(150))
 @given(MOVEMENTS, st.floats(0, 1), st.sampled_from([645, 2580, 1]), st.floats(0, 1), st.sampled_from([645, 2580]))
 def test_a_braked_movement_keeps_its_past_and_ends_at_low_speed(
     made: Movement, part: float, interval: int, again: float, second: int

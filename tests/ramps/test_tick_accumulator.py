@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.ramps.tick_accumulator import TICK, UNIT, UPDATES, Plan, Point, first_true, slewing, stopping, toward
 
@@ -75,7 +76,7 @@ def agrees(plan: Plan, loop: Loop) -> None:
             assert plan.point(tick) == loop.points[tick], tick
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.integers(0, 400), phases, rates, rates, steep, steep)
 def test_a_move_from_rest_is_the_firmwares_loop(steps, phase, keep, run, slope, braking_slope):
     speed = min(keep, run) * UPDATES
@@ -90,7 +91,7 @@ def test_a_move_from_rest_is_the_firmwares_loop(steps, phase, keep, run, slope, 
         assert (plan.rises, plan.falls) == (rises, falls)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.integers(0, 300), phases, st.integers(0, 10**9), rates, rates, steep, steep, st.booleans())
 def test_a_move_whose_slope_changes_on_the_way_is_the_firmwares_loop(
     steps, phase, extra, run, keep, slope, braking_slope, braking
@@ -104,13 +105,13 @@ def test_a_move_whose_slope_changes_on_the_way_is_the_firmwares_loop(
         agrees(plan, loop_toward(*args, braking)[0])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(phases, st.integers(1, 62_500 * UPDATES), steep, rates, st.one_of(st.integers(0, 5), st.just(10**9)))
 def test_a_stop_is_the_firmwares_loop(phase, speed, slope, keep, room):
     agrees(stopping(phase, speed, slope, keep, room), loop_stopping(phase, speed, slope, keep, room))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(phases, st.integers(1, 62_500 * UPDATES), rates, steep, st.integers(0, 300))
 def test_a_slew_is_the_firmwares_loop(phase, speed, run, slope, room):
     plan = slewing(phase, speed, run, slope, room)

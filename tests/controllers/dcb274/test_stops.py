@@ -7,11 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controllers.dcb274 import histories
 from tests.controllers.dcb274.histories import Action, begun, do, motions, shaft
+from tests.generated import examples
 
 from detent.controllers.dcb274.desk import Stage
 from detent.ticks import MS, SECOND
 
-FEW = settings(max_examples=200, deadline=None)
+FEW = settings(max_examples=examples(200), deadline=None)
 MANY = settings(max_examples=10_000, deadline=None)
 
 

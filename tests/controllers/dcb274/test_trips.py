@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controllers.dcb274.bench_unit import Bench
 from tests.controllers.dcb274.histories import executed
+from tests.generated import examples
 
 from detent.axis import MotionStarted
 from detent.controllers.dcb274 import commands
@@ -204,7 +205,7 @@ def agrees(program: tuple[list[str], list[str], list[str], int]) -> None:
 
 
 @given(program=PROGRAMS)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_a_trip_is_served_when_the_manual_says(program: tuple[list[str], list[str], list[str], int]) -> None:
     agrees(program)
 

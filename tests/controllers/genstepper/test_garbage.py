@@ -2,6 +2,7 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.controllers.genstepper.firmware import GenStepper
 from detent.ticks import MS
@@ -17,7 +18,7 @@ def started(timed: bool) -> GenStepper:
     return board
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.binary(max_size=60), st.integers(0, 50 * MS))
 def test_garbage_is_answered_and_never_crashes(data, wait):
     board = started(timed=False)

@@ -7,13 +7,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.controllers.genstepper.histories import KEYS, LIMITS, OFF_AND_ON, Life, calm, histories, turnings
+from tests.generated import examples
 
 from detent.controllers.device import DriveSet
 from detent.controllers.genstepper.inputs import Keys, keys
 from detent.ticks import MS, SECOND
 from detent.uart import Sent
 
-FEW = settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+FEW = settings(max_examples=examples(100), deadline=None, suppress_health_check=list(HealthCheck))
 MANY = settings(max_examples=10_000, deadline=None, suppress_health_check=list(HealthCheck))
 TICK = 16_000
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from tests.controllers.gsc200 import inputs
+from tests.generated import examples
 
 from detent.controllers.device import Executing, Refused, StoreImage
 from detent.controllers.gsc200.firmware import GsC200
@@ -17,7 +18,7 @@ from detent.ticks import MS, SECOND
 from detent.uart import Char, Sent
 
 SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck)}
-FAST = settings(max_examples=120, **SETTINGS)
+FAST = settings(max_examples=examples(120), **SETTINGS)
 THOROUGH = settings(max_examples=800, **SETTINGS)
 SEL = {1: (0, 1, 1), 2: (1, 0, 1), 3: (0, 0, 1), 4: (1, 1, 0), 5: (0, 1, 0), 6: (1, 0, 0), 7: (0, 0, 0)}
 

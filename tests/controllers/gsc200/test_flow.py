@@ -2,6 +2,7 @@
 
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.controllers.device import Executing
 from detent.controllers.gsc200.firmware import GsC200
@@ -94,7 +95,7 @@ INSTRUCTIONS = st.one_of(
 PROGRAMS = st.lists(INSTRUCTIONS | st.sampled_from(["L0", "L2", "L3", "A1"]), min_size=1, max_size=12)
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(300), deadline=None, suppress_health_check=list(HealthCheck))
 @given(PROGRAMS, st.integers(0, 7))
 @example(["L0", "A1", "L2", "C1", "L3"], 0)
 @example(["A1", "L2", "C1", "L3"], 0)

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.controllers.gsc200 import pulse_model
 from tests.controllers.gsc200.pulse_model import Event, Move
+from tests.generated import examples
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.recording import Recording
@@ -117,7 +118,7 @@ def event_lists(draw: st.DrawFn, move: Move) -> list[Event]:
     return [Event(max(at, SECOND), kind, level) for at, (kind, level) in sorted(chosen, key=lambda item: item[0])]
 
 
-@settings(max_examples=400, **SETTINGS)
+@settings(max_examples=examples(400), **SETTINGS)
 @given(data=st.data(), direction=st.sampled_from([1, -1]), enabled=st.sampled_from([True, True, True, False]))
 def test_every_pulse_comes_when_the_specification_says(data: st.DataObject, direction: int, enabled: bool) -> None:
     move = data.draw(moves())

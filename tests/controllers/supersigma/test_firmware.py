@@ -5,6 +5,7 @@ import copy
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.assembler import ImageError
 from detent.axis import MotionEnded, MotionStarted
@@ -87,7 +88,7 @@ def test_speed_bytes_are_units_of_100_half_steps_a_second() -> None:
     assert bench.now == 1000 * 3333 * 500  # N = INT(2e6 / 600 - 1 + 0.5) = 3332
 
 
-@settings(deadline=None, max_examples=80)
+@settings(deadline=None, max_examples=examples(80))
 @given(st.integers(1, 20_000), st.sampled_from(list(Way)), st.floats(0, 1.2), st.sampled_from(["stop", "emergency"]))
 def test_status_tells_the_steps_done_after_a_stop_anywhere(steps: int, way: Way, part: float, word: str) -> None:
     bench = Bench(short=way)
@@ -254,7 +255,7 @@ def test_a_copy_in_the_middle_of_a_ramp_goes_on_alike() -> None:
     assert bench.position == twin.position
 
 
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=examples(200))
 @given(
     st.lists(
         st.one_of(st.binary(max_size=5), st.sampled_from([b"\x01\x05", b"\x01\x01\x00\x05", b"\x01\x06"])), max_size=20
