@@ -42,11 +42,19 @@ def test_where_there_is_no_pip_uv_does(prefix: Path, monkeypatch: pytest.MonkeyP
     assert extras.how_to_install("fast") == f"uv pip install --python {prefix}/bin/python 'detent-motion[fast]'"
 
 
-def test_a_tool_of_uv_or_pipx_is_installed_anew(prefix: Path) -> None:
+def test_a_tool_of_uv_or_pipx_is_installed_anew_with_the_extras_that_it_has(
+    prefix: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there: set[str] = set()
+    monkeypatch.setattr(extras, "installed", there.__contains__)
     (prefix / "pipx_metadata.json").touch()
     assert extras.how_to_install("epics") == "pipx install --force 'detent-motion[epics]'"
+    there |= {"workbench", "figures"}
+    assert extras.how_to_install("epics") == "pipx install --force 'detent-motion[epics,figures,workbench]'"
     (prefix / "uv-receipt.toml").touch()
-    assert extras.how_to_install("epics") == "uv tool install --force 'detent-motion[epics]'"
+    assert extras.how_to_install("epics") == "uv tool install --force 'detent-motion[epics,figures,workbench]'"
+    there.clear()
+    assert extras.how_to_install() == "uv tool install --force detent-motion"
 
 
 def test_a_checkout_is_set_up_again(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,7 +42,10 @@ def need(extra: str, what: str) -> None:
 
 
 def how_to_install(extra: str = "") -> str:
-    """The command that adds `extra` to this installation, or repairs it: a checkout, uv tool, pipx, an environment."""
+    """The command that adds `extra` to this installation, or repairs it: a checkout, uv tool, pipx, an environment.
+
+    A tool is installed anew as a whole, so the extras that it has are named again.
+    """
     import shlex  # these take longer to load than most of what Detent needs at every start
     from pathlib import Path
 
@@ -53,10 +56,12 @@ def how_to_install(extra: str = "") -> str:
         return f"make -B -C {shlex.quote(str(sources))} setup"
     if sources is not None:
         return f"{_pip()} -e '{sources}[{extra}]'" if extra else f"{_pip()} -e {sources}"
+    whole = ",".join(sorted({name for name in EXTRAS if installed(name)} | ({extra} if extra else set())))
+    tool = f"'{DISTRIBUTION}[{whole}]'" if whole else DISTRIBUTION
     if (prefix / "uv-receipt.toml").is_file():
-        return f"uv tool install --force {wanted}"
+        return f"uv tool install --force {tool}"
     if (prefix / "pipx_metadata.json").is_file():
-        return f"pipx install --force {wanted}"
+        return f"pipx install --force {tool}"
     return f"{_pip()} {wanted}"
 
 

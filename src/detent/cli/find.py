@@ -41,10 +41,13 @@ def find(
         Print what was looked at and what was found as one line of JSON.
     """
     from detent.hosts.finding import USUAL
-    from detent.realtime.addresses import Address
+    from detent.realtime.addresses import Address, PortError
     from detent.realtime.finding import listed, passes_for
 
-    wanted = [(port, "") for port in ports] or [(port.device, port.what) for port in listed()]
+    try:
+        wanted = [(port, "") for port in ports] or [(port.device, port.what) for port in listed()]
+    except PortError as error:
+        failed(error)
     try:
         families = _families(model) or USUAL
         searches = [

@@ -6,6 +6,7 @@ a processor; a variant at the very edge of a loss may then get another verdict.
 
 from enum import Enum
 
+from detent.extras import MissingExtra, installed
 from detent.motors import engine
 from detent.motors.motor import MotorError
 
@@ -30,6 +31,8 @@ def use(wanted: bool = True, *, where_there_is_one: bool = False) -> None:
     _judged[0] = False
     there = wanted and available()
     if wanted and not there and not where_there_is_one:
+        if not installed("fast"):
+            raise MotorError(str(MissingExtra("fast", "work on a GPU needs")))
         raise MotorError(
             "there is no GPU here that numba sees: it needs a driver of NVIDIA's, and numba-cuda[cu12] or [cu13] with "
             "CUDA 12 or 13 beside numba"

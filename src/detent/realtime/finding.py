@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol, cast
 
 from detent.hosts.exchange import NOTHING, Answer, Ask, Blocking, Clear, Driver, Port, Step, Steps, Watch
 from detent.hosts.finding import PATIENCE, Found, Pass, Tune, plan, search
-from detent.realtime.addresses import Address
+from detent.realtime.addresses import Address, PortError
 from detent.realtime.ports import RealPort
 from detent.uart import Format
 
@@ -21,8 +21,12 @@ class Listed(NamedTuple):
 
 
 def listed() -> list[Listed]:
-    """The serial ports of this computer, by name."""
-    from serialx import list_serial_ports  # only here: it takes a while
+    """The serial ports of this computer, by name. Raises PortError where nothing is there that lists them."""
+    try:
+        from serialx import list_serial_ports  # only here: it takes a while
+    except Exception as error:  # it is not for every system, and says so in many ways
+        why = f"serialx, which lists serial ports, cannot be loaded: {error}"
+        raise PortError(f"{why}; name a port yourself, as HOST:PORT") from error
 
     found = []
     for port in list_serial_ports():

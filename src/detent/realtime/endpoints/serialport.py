@@ -23,8 +23,9 @@ class SerialPort:
             raise EndpointError("serial ports are served on Linux and macOS; here take --tcp or --rfc2217 HOST:PORT")
         try:
             import serialx
-        except ImportError as error:
-            raise EndpointError(f"--serial needs serialx, which is not installed: {how_to_install()}") from error
+        except Exception as error:  # it is not for every system, and says so in many ways
+            why = f"--serial needs serialx, which cannot be loaded ({error})"
+            raise EndpointError(f"{why}: {how_to_install()}") from error
         self.address = address
         if _is_pseudo_terminal(address):  # it carries bytes, and Linux refuses it any other format
             form = form._replace(data_bits=8, parity="none")
