@@ -438,7 +438,8 @@ class Board:
                 self.core.command("config_reset")
             return
         if self.state is State.CONFIGURING and not self._recovering:
-            self._refuse("", "", f"the firmware does not take this configuration: {reason}")
+            remedy = "perhaps a pin of this board cannot do what [hardware] uses it for: take another"
+            self._refuse("", "", f"the firmware does not take this configuration ({reason}): {remedy}")
         elif self.state is State.CONFIGURING and message.name == "shutdown":
             # a watchdog that nobody has fed since it was lost: it is taken from there, as if it had been found so
             self.core.forget_questions()
