@@ -333,11 +333,13 @@ class Dcb274(OneAxis):
     def start(self, now: Ns) -> None:
         """Start the program that was loaded, as G would.
 
-        Nothing happens without power, while a program runs, a jog moves the axis, or the soft stop input is active.
+        Nothing happens without power, in program mode, while a command is in hand or waits, a program runs, a jog
+        moves the axis, or the soft stop input is active.
         """
         self.advance(now)
         self._quiet = False
-        if self._powered and not (self._running.active or self._motion.jogging or self._ports.stopped):
+        at_something = self._desk.stage is not Stage.FREE or self._desk.programming or self._running.active
+        if self._powered and not (at_something or self._motion.jogging or self._ports.stopped):
             self._running.go(self._base, False, now)
 
     def only_its_program(self, now: Ns) -> bool:
