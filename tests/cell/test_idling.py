@@ -5,6 +5,7 @@ A cell that is asked for an instant at a time runs through every turn. Beside it
 
 from collections.abc import Callable
 from contextlib import suppress
+from itertools import pairwise
 from random import Random
 from typing import Final, NamedTuple
 
@@ -18,7 +19,10 @@ from detent.cell.faults import StuckPin, SupplyDip
 from detent.cell.recording import Recording
 from detent.cell.turns import Turn, Turns
 from detent.controllers.device import Executing
+from detent.outputs.curves import instructions
+from detent.outputs.signals import of_cell
 from detent.pins import HIGH, LOW, PinSet
+from detent.realtime.watch import Watch
 from detent.ticks import MS, NEVER, SECOND, Ns
 
 YEAR: Final[Ns] = 31_557_600 * SECOND
@@ -340,3 +344,49 @@ def test_nobody_can_tell() -> None:
 @pytest.mark.slow
 def test_nobody_can_tell_in_many_more_cells() -> None:
     assert check(2_000) > 500
+
+
+# -- who looks at it -----------------------------------------------------------------------------------------
+
+
+def test_a_watch_shows_where_programs_in_loops_are() -> None:
+    units = [LOOPS[name] for name in ("delays and outputs", "an L that polls", "outputs")]
+    watches = []
+    for go in (Cell.run_to, step_to):
+        cell = many(units)
+        cell.recording = watch = Watch(cell)
+        go(cell, 30 * SECOND + 77)
+        watches.append([(unit.front.executing, unit.front.levels, unit.sent, unit.received) for unit in watch.of_unit])
+        passing = many(units)
+        passing.recording = Watch(passing, passes_on=True)
+        go(passing, 5 * SECOND)
+        watches.append(passing.recording.take())
+    assert watches[0] == watches[2]
+    assert [(u, e) for u, entries in watches[1] for e in entries] == [(u, e) for u, es in watches[3] for e in es]
+
+
+def test_signals_of_a_year_have_what_changed_and_no_more_than_can_be_held() -> None:
+    poll = one(*LOOPS["an L that polls"])
+    poll.run_to(1000 * SECOND)
+    poll.set_pin("u0", "P1", LOW)
+    poll.run_to(YEAR)
+    wave = of_cell(poll).unit("u0").wave("P1")
+    assert wave.times.tolist() == [1000 * SECOND]
+    blink = one(*LOOPS["outputs"])
+    blink.run_to(YEAR)
+    with pytest.raises(ValueError, match="run for less"):
+        of_cell(blink)
+
+
+def test_a_figure_draws_a_year_of_instructions_as_one_band() -> None:
+    cell = one(*LOOPS["an L that polls"])
+    cell.run_to(YEAR)
+    bands = instructions(of_cell(cell), "u0")
+    assert [band.label for band in bands].count("") == 1
+    assert max(band.end - band.begin for band in bands) > YEAR - SECOND
+    assert all(one.end <= other.begin for one, other in pairwise(bands))
+    for go in (Cell.run_to, step_to):
+        cell = one(*LOOPS["an L that polls"])
+        go(cell, 20 * SECOND)
+        executed = [entry for entry in told(cell).of("u0") if isinstance(entry, Executing)]
+        assert len(instructions(of_cell(cell), "u0")) == len(executed)

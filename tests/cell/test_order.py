@@ -14,9 +14,11 @@ from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import parse
 from detent.cell.parts import PARTS
+from detent.cell.recording import Received
 from detent.controllers import catalogue
 from detent.pins import LOW, PinKind, PinSet
-from detent.ticks import SECOND
+from detent.ticks import MS, SECOND
+from detent.uart import Sent
 
 COMMAND = {  # what each is told at 1 s, and at 2 s
     "gs-c200": ("+40", "G0"),
@@ -217,3 +219,20 @@ def test_which_unit_is_switched_on_first_changes_no_pulse_at_length(
     case: tuple[Plan, list[str], dict[str, int]],
 ) -> None:
     check_supply(*case)
+
+
+def test_a_unit_that_is_strapped_otherwise_changes_what_no_other_unit_of_its_line_hears() -> None:
+    text = "".join(f'[units.{u}]\nmodel = "gs-c200s"\nstraps = {{ {s} = 0, CHS = 0 }}\n' for u, s in
+                   (("a", "SEL0"), ("b", "SEL1"), ("c", "SEL2")))  # fmt: skip
+    cell = build(parse(text + '[lines.bus]\nunits = ["a", "b", "c"]\n', "cell"), str)
+    cell.run_to(100 * MS)
+    cell.power("b", False)
+    cell.set_pin("b", "BR0", 1 - cell.controller("b").straps["BR0"])
+    cell.power("b", True)
+    cell.run_to(200 * MS)
+    cell.type("c", "V1")
+    cell.run_to(2 * SECOND)
+    assert cell.recording is not None
+    heard = {u: [e.char for e in cell.recording.of(u) if isinstance(e, Received)] for u in "abc"}
+    assert heard["a"] == heard["c"] != heard["b"]
+    assert any(isinstance(entry, Sent) for entry in cell.recording.of("c"))
