@@ -144,8 +144,8 @@ class _Place(Enum):
     TAKEN = "a closed line that was an interrupt"
 
 
+_START: Final = _Place.START
 _OTHERS: Final = _Place.OTHERS
-_HEEDED: Final = _SINGLE | {LF}  # in a line for somebody else
 
 
 class NamedEntry:
@@ -206,15 +206,15 @@ class NamedEntry:
         Of 32 axes on a line, 31 do nothing else with nearly every character.
         """
         place = self._place
-        if place is _OTHERS and value not in _HEEDED:
-            return not self._passes
-        if self._passes or value in _SINGLE or place is _Place.MINE or place is _Place.TAKEN:
+        if self._passes or value in _SINGLE:
             return False
-        if value == LF:
-            self._place = _Place.START
-        elif value == self.name and place is _Place.START:
+        if place is _OTHERS:
+            if value == LF:
+                self._place = _START
+            return True
+        if place is not _START or value == self.name:
             return False
-        else:
+        if value != LF:
             self._place = _OTHERS
         return True
 
