@@ -12,8 +12,8 @@ import pytest
 
 from detent.cell.build import build
 from detent.cell.description import parse
+from detent.cell.real_pins import unreal
 from detent.cli import main
-from detent.cli.serve import unreal
 
 COMMAND = [sys.executable, "-c", "from detent.cli import main; main()", "serve"]
 TWO_LINES = '[units.bar]\nmodel = "gs-c200"\n[units.drill]\nmodel = "gs-c200s"\n'
@@ -260,4 +260,4 @@ def test_what_of_a_cell_has_no_real_pins_is_said() -> None:
         (text + hung, True, ["Without real pins: b ([hardware.b] would give it some)", "Nothing hangs on two"]),
     ):
         described = parse(cell, "cell.toml")
-        assert unreal(described, build(described, lambda name: ""), driven=driven) == said
+        assert unreal(described, tuple(build(described, lambda name: "").controllers()), driven=driven) == said

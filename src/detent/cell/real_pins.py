@@ -152,3 +152,21 @@ def _check_switches(
             what = f"{key} has no {pin}: wire it, inputs = {{ {pin} = 'PIN' }}"
             remedy = f"or say that the machine has none, unwired = ['{pin}']"
             raise Problem(described.file, f"hardware.{key}.inputs", f"{what}, {remedy}")
+
+
+def unreal(described: Description, controllers: Sequence[str], *, driven: bool) -> list[str]:
+    """What of a cell with boards has no real pins, so that nobody waits for a motor that is none."""
+    if not described.hardware:
+        return []
+    used = list(dict.fromkeys(table.board for table in described.hardware.values()))
+    if not driven:
+        return [f"No pin is driven: with --real the motors on {', '.join(used)} would move."]
+    units = {key.partition(".")[0] for key in described.hardware}
+    told = []
+    alone = [unit for unit in controllers if unit not in units]
+    if alone:
+        told.append(f"Without real pins: {', '.join(alone)} ([hardware.{alone[0]}] would give it some)")
+    spare = [name for name in described.boards if name not in used]
+    if spare:
+        told.append(f"Nothing hangs on {', '.join(spare)}")
+    return told

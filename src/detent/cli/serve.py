@@ -277,6 +277,8 @@ def _print_ready(
     service: "Service", description: "Description", folder: Path, pace: float, control: str | None
 ) -> None:
     """Say what is served, and how to connect: a line to copy for each endpoint."""
+    from detent.cell.real_pins import unreal
+
     speed = "real time" if pace == 1 else f"{pace:g} times real time"
     print(f"Serving {', '.join(description.units)} in {speed}; EEPROM images in {folder}")
     for unit, line in _straps(description, service.cell):
@@ -286,7 +288,7 @@ def _print_ready(
             axes = ", ".join(ledger.name for ledger in service.driven.ledgers if ledger.what.board == state.board)
             lead = service.driven.plan.lead / 1e6
             print(f"Real pins of {state.board} ({state.firmware}): {axes or 'no axis'}; {lead:g} ms behind")
-    for line in unreal(description, service.cell, driven=service.driven is not None):
+    for line in unreal(description, tuple(service.cell.controllers()), driven=service.driven is not None):
         print(line)
     print("Connect:")
     width = max(len(endpoint.unit) for endpoint in service.endpoints)
@@ -299,24 +301,6 @@ def _print_ready(
     for hint in _hints(description):
         print(hint)
     print("Ctrl-C ends it.", flush=True)
-
-
-def unreal(description: "Description", cell: "Cell", *, driven: bool) -> list[str]:
-    """What of a cell with boards has no real pins, so that nobody waits for a motor that is none."""
-    if not description.hardware:
-        return []
-    used = list(dict.fromkeys(table.board for table in description.hardware.values()))
-    if not driven:
-        return [f"No pin is driven: with --real the motors on {', '.join(used)} would move."]
-    units = {key.partition(".")[0] for key in description.hardware}
-    told = []
-    alone = [unit for unit in cell.controllers() if unit not in units]
-    if alone:
-        told.append(f"Without real pins: {', '.join(alone)} ([hardware.{alone[0]}] would give it some)")
-    spare = [name for name in description.boards if name not in used]
-    if spare:
-        told.append(f"Nothing hangs on {', '.join(spare)}")
-    return told
 
 
 def _hints(description: "Description") -> list[str]:

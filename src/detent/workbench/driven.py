@@ -16,6 +16,7 @@ from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.history import History
 from detent.cell.outside import no_store
+from detent.cell.real_pins import unreal
 from detent.cell.stores import Stores
 from detent.outputs.units import views
 from detent.realtime.boards.drive import Opened, RealPins
@@ -63,6 +64,7 @@ class DrivenEngine(Engine):
         )  # fmt: skip
         if self._order.control is not None:
             observe(real, passes_on=True)
+        self._reports += unreal(described, tuple(real.controllers()), driven=True)
         self._stores = Stores()
         cell = self._alike(found, line_timing)
         self._driven = opened.drive(real, stores)

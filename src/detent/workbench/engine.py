@@ -30,6 +30,7 @@ from detent.cell.actions import (
 from detent.cell.cell import Cell
 from detent.cell.description import Description, Problem
 from detent.cell.history import Broken, History
+from detent.cell.real_pins import unreal
 from detent.cell.recording import Entry
 from detent.cell.stores import Stores
 from detent.controllers import catalogue
@@ -157,6 +158,7 @@ class Engine:
         cell = build_with_images(
             found.description, found.read, self._images, line_timing, self._reports, True, self._stores.save
         )
+        self._reports += unreal(found.description, tuple(cell.controllers()), driven=False)
         if self._order.control is not None:
             cell.recording = Watch(cell, passes_on=True)  # for who asks how units stand; copies take theirs along
         shafts = {name: unit.shaft for name, unit in found.description.units.items()}

@@ -123,7 +123,7 @@ class Picture(NamedTuple):
     motors: Mapping[str, MotorPicture]
     wires: tuple[WirePicture, ...]
     lines: Mapping[str, LinePicture]
-    reports: tuple[str, ...] = ()  # about images that could not be used
+    reports: tuple[str, ...] = ()  # images that could not be used, pins that are not driven
 
 
 # -- the state: a look at it ------------------------------------------------------------------------------------
