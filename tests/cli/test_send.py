@@ -146,10 +146,11 @@ def test_another_controller_behind_a_port_is_told_with_what_looks_for_it(capsys:
         assert "position()" not in out + err
 
 
-def test_a_program_of_a_dcb_274_is_traced_as_it_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    """Page 38: G with 1 prints each instruction."""
+@pytest.mark.parametrize(("begin", "end"), [("P 0", "P"), ("P", "P 0"), ("P0", "P 7"), ("P", "P")])
+def test_a_program_of_a_dcb_274_is_traced_as_it_runs(begin: str, end: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Page 38: G with 1 prints each instruction. Page 47: any P ends program mode."""
     with served("dcb-274") as service:
-        out, _ = told(capsys, "dcb-274", address(service), "--patience", "2", "P 0", "+ 10", "W 0", "P", "G 0 1")
+        out, _ = told(capsys, "dcb-274", address(service), "--patience", "2", begin, "+ 10", "W 0", end, "G 0 1")
     assert "(the program has ended)" in out
     assert "+ 10" in next(line for line in out.splitlines() if line.startswith("|"))
 
@@ -161,6 +162,9 @@ def test_a_sequence_that_is_refused_leaves_no_program_mode_behind(capsys: pytest
         assert "a line was refused: program mode was ended (P)" in err
         out, _ = told(capsys, "dcb-274", port, "--patience", "2", "X")
         assert "n=" in out
+        told(capsys, "dcb-274", port, "--patience", "2", "P", "A 8")  # and leaves it so
+        out, err = told(capsys, "dcb-274", port, "--patience", "2", "P 0", "Q 0")
+        assert "A 8" in out
     with served("gs-c200s") as service:
         _, err = told(capsys, "gs-c200s", address(service), "Po", "A1", "A9", status=1)
         assert "programming mode was left (Px)" in err

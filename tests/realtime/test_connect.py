@@ -2,6 +2,7 @@ import asyncio
 import subprocess
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import pytest
 from tests.realtime.served import address, served
@@ -146,3 +147,9 @@ def test_detent_has_both_and_importing_it_brings_neither() -> None:
     program = "import sys, detent; print(any(name.startswith('detent.') for name in sys.modules))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
+
+
+@pytest.mark.parametrize("model", [None, 7, ["gs-c200"], b"gs-c200"])
+def test_what_is_no_name_of_a_model_is_told(model: Any) -> None:
+    with pytest.raises(ValueError, match="a model is a name, one of gs-c200, gs-c200s"):
+        connect(model, "box:4001")

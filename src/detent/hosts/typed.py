@@ -264,7 +264,7 @@ def _dcb274(driver: Dcb274, text: str, seconds: float, heard: Heard) -> Steps[Sa
         return Said((), "started")
     answer = yield from driver.command(text, seconds)
     if re.fullmatch(r"P ?\d*", text):
-        driver.programming = text != "P"
+        driver.programming = not driver.in_program_mode  # the P that ends it ignores its address
     return Said((answer,) if answer.strip() else (), _answered(text, answer.strip()) if answer.strip() else "done")
 
 

@@ -62,6 +62,8 @@ LINE: dict[str, tuple[int | str, ...]] = {
 
 def host(model: str) -> Host:
     """How `model` is driven. Raises ValueError, with the likeliest of the models there are."""
+    if not isinstance(model, str):
+        raise ValueError(f"a model is a name, one of {', '.join(HOSTS)}, not {model!r}")
     try:
         return HOSTS[model]
     except KeyError:

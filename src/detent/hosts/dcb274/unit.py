@@ -74,6 +74,11 @@ class Unit(Axis):
         self._connected = False
         self._divide = self._slope = None
 
+    @property
+    def in_program_mode(self) -> bool:
+        """Whether lines are stored, as far as is known: `command` has begun that, or it was found so (page 47)."""
+        return self.programming or (isinstance(self._way, SingleMode) and self._way.programming)
+
     # -- the line ----------------------------------------------------------------------------------------
 
     @operation
