@@ -153,7 +153,7 @@ def test_whatever_is_said_and_pressed_nothing_is_lost_in_many_sessions(kind: str
     assert sum(session(kind, seed) for seed in range(100, 200)) > 30
 
 
-@pytest.mark.parametrize("seed", [132, 165])
+@pytest.mark.parametrize("seed", [132, 165, 189])
 def test_sessions_that_lost_something_once(seed: int) -> None:
     """A stop of two axes of which one was sent for later, when the input was over; and what came of it."""
     session("bs0610", seed)

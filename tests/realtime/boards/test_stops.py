@@ -6,6 +6,7 @@ import pytest
 from tests.realtime.boards.bench import Bench, bench
 
 from detent.axis import MotionStarted
+from detent.pulses import Train, Uniform
 from detent.ramps import constant_acceleration
 from detent.realtime.boards.events import CountDiffers, InputChanged, Stopped
 from detent.realtime.boards.fake.machine import MachineSwitch
@@ -247,3 +248,23 @@ def test_the_host_hears_of_it_within_the_lead_and_some_ms() -> None:
     made.until(lambda: bool(made.of(Stopped)))
     [stop] = made.of(Stopped)
     assert made.now - stop.at < 40 * MS
+
+
+@pytest.mark.parametrize("late", range(0, 600, 60))
+def test_no_step_follows_a_stop_that_fires_before_the_first_steps_are_sent(late: int) -> None:
+    """The word of it is still on the wire when the host sends the first pulses since the last stop: none is taken."""
+    made = bench()
+    made.machine.set("gpio10", True, made.board.now)
+    made.run(10 * MS)
+    made.boards.stops["slide"].arm({"EOT": False}, made.now)
+    made.move(Train((Uniform(0, 40 * MS, 1, 20),)), 1)
+    made.run(40 * MS - 100 * US)
+    assert not made.machine.steps
+    made.ports[0].run_to(made.wall)
+    made.machine.set("gpio10", False, made.board.now)
+    made.turn(made.wall + late * US)
+    made.run(100 * MS)
+    assert len(made.of(Stopped)) == 1
+    made.boards.steppers["slide"].rewind(0)
+    made.run(200 * MS)
+    assert not made.machine.steps

@@ -392,6 +392,14 @@ class Stepper:
             core.queue.take(channel.oid, rest.tick(1))
         channel.last = run.last
 
+    def set_clock(self, wall: WallNs) -> None:
+        """Give the firmware a step clock where it has none: before a stop can fire, as behind that is too late."""
+        for channel in self._channels:
+            if channel.last is None:
+                channel.last = self._core.clock.tick_at(wall)
+                self._core.command("reset_step_clock", oid=channel.oid, clock=channel.last & MASK)
+        self._runs = None
+
     def not_before(self, tick: int) -> None:
         """No pulse of the newest motion at or before `tick`: a stop comes into force then."""
         self._not_before = max(self._not_before, tick)

@@ -135,6 +135,7 @@ class Stop:
             return
         self._quieting = 0
         if not self._alive:
+            self._axis.set_clock(wall)
             report = core.unhurried(wall)
             core.comes(report)
             core.command("trsync_start", oid=self.oid, report_clock=report & MASK, report_ticks=core.ticks(REPORT),
