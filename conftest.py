@@ -97,7 +97,7 @@ def _run(command: str) -> tuple[int, str]:
         raise SkipTest(f"{program} is not installed")
     done = subprocess.run(
         ["bash", "-c", command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        text=True, timeout=60, check=False,
+        text=True, timeout=300, check=False,
     )  # fmt: skip
     return done.returncode, done.stdout
 

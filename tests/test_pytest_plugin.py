@@ -16,7 +16,7 @@ class Host:
     """Host software of the kind that is to be tested: it repeats what was not understood (datasheet, E1)."""
 
     def __init__(self, port: str) -> None:
-        self.line = serial.Serial(port, 9600, bytesize=7, parity="O", stopbits=2, timeout=10)
+        self.line = serial.Serial(port, 9600, bytesize=7, parity="O", stopbits=2, timeout=180)
         self.sent = 0
 
     def ask(self, command: str) -> str:

@@ -56,7 +56,7 @@ class Client:
                 if isinstance(message, kind) and all(getattr(message, name) == it for name, it in has.items()):
                     return message
             assert not any(isinstance(message, caproto.ErrorResponse) for message in self.seen), self.seen
-            data = await asyncio.wait_for(self._reader.read(65536), 60)
+            data = await asyncio.wait_for(self._reader.read(65536), 180)
             assert data, "the server has closed the circuit"
             commands, _ = self._circuit.recv(data)
             for command in commands:

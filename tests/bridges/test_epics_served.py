@@ -72,7 +72,7 @@ def running(command: list[str], environment: dict[str, str]) -> Iterator[Ioc]:
             yield Ioc(served, json.loads(line), environment)
         finally:
             served.send_signal(signal.SIGTERM)
-            out, err = served.communicate(timeout=60)
+            out, err = served.communicate(timeout=180)
         assert (served.returncode, out, err) == (0, "", "")
 
 
@@ -112,14 +112,14 @@ from caproto.sync.client import read, write
 told = {}
 for number in (1, 3, 4, 5):
     pv = f"T:m{number}"
-    write(pv, 2.5, notify=True, timeout=60, repeater=False)
+    write(pv, 2.5, notify=True, timeout=180, repeater=False)
     fields = (".RBV", ".VAL", ".RRBV", ".DMOV", ".MISS")
     told[pv] = [float(read(pv + field, repeater=False).data[0]) for field in fields]
-    write(pv, 0, notify=True, timeout=60, repeater=False)
-told["refused"] = write("T:m1", 51, notify=True, timeout=60, repeater=False).status.name
-told["cannot"] = write("T:m4.HOMF", 1, notify=True, timeout=60, repeater=False).status.name
+    write(pv, 0, notify=True, timeout=180, repeater=False)
+told["refused"] = write("T:m1", 51, notify=True, timeout=180, repeater=False).status.name
+told["cannot"] = write("T:m4.HOMF", 1, notify=True, timeout=180, repeater=False).status.name
 told["alarm"] = read("T:m4.SEVR", repeater=False).data[0].decode()
-write("T:m4.SYNC", 1, notify=True, timeout=60, repeater=False)
+write("T:m4.SYNC", 1, notify=True, timeout=180, repeater=False)
 told["settled"] = read("T:m4.SEVR", repeater=False).data[0].decode()
 for field in ("EGU", "DESC", "RTYP"):
     told[field] = bytes(read("T:m1." + field, data_type="control" if field == "RTYP" else None, repeater=False)
@@ -144,14 +144,14 @@ from ophyd.sim import det
 from ophyd.utils import LimitError
 told = {}
 motor = EpicsMotor("T:m1", name="motor")
-motor.wait_for_connection(timeout=30)
+motor.wait_for_connection(timeout=180)
 told["limits"] = list(motor.limits)
 told["egu"] = motor.egu
-told["moved"] = motor.move(5, timeout=60).success
+told["moved"] = motor.move(5, timeout=180).success
 told["position"] = motor.position
-told["empty"] = motor.move(5, timeout=60).success
+told["empty"] = motor.move(5, timeout=180).success
 try:
-    motor.move(51, timeout=60)
+    motor.move(51, timeout=180)
 except LimitError as error:
     told["refused"] = type(error).__name__
 motor.velocity.put(1, wait=True)  # so that there is time enough on the slowest computer
@@ -160,7 +160,7 @@ while motor.position < 5.1:
     threading.Event().wait(0.001)
 motor.stop()
 try:
-    status.wait(60)
+    status.wait(180)
 except Exception as error:
     told["stopped"] = type(error).__name__
 while motor.moving:
@@ -175,9 +175,9 @@ RunEngine()(scan([det], motor, 1, 3, 5), lambda name, document: kinds.append(nam
 told["scan"] = kinds
 told["last"] = motor.position
 switched = EpicsMotor("T:m2", name="switched")
-switched.wait_for_connection(timeout=30)
+switched.wait_for_connection(timeout=180)
 try:
-    switched.move(40, timeout=60)
+    switched.move(40, timeout=180)
 except Exception as error:
     told["limit switch"] = type(error).__name__
 told["met"] = switched.high_limit_switch.get()
@@ -207,7 +207,7 @@ from ophyd_async.core import FlyMotorInfo, init_devices
 from ophyd_async.epics.motor import Motor, MotorLimitsError
 told = {}
 engine = RunEngine()
-with init_devices(timeout=30):
+with init_devices(timeout=180):
     motor = Motor("ca://T:m3", name="motor")
 
 async def by_hand():
@@ -275,7 +275,7 @@ def test_a_unit_at_a_port_is_moved_too(ioc: Ioc) -> None:
             told = other.client("""
 import json
 from caproto.sync.client import read, write
-write("SIM:m1", -25, notify=True, timeout=60, repeater=False)
+write("SIM:m1", -25, notify=True, timeout=180, repeater=False)
 print(json.dumps({"RBV": float(read("SIM:m1.RBV", repeater=False).data[0])}))
 """)
         assert told == {"RBV": -25}
@@ -323,7 +323,7 @@ def test_a_port_that_is_not_there_fails_in_one_line(capsys: pytest.CaptureFixtur
 def test_an_address_that_is_not_this_computers_fails_in_one_line() -> None:
     words = ["epics", "gs-c200", "--interfaces", "192.0.2.1"]  # an address of documentation (RFC 5737)
     # in a process of its own: the sockets that caproto has tried are left to the collector
-    ended = subprocess.run([sys.executable, "-m", "detent", *words], capture_output=True, text=True, timeout=60)
+    ended = subprocess.run([sys.executable, "-m", "detent", *words], capture_output=True, text=True, timeout=180)
     assert ended.returncode == 1
     assert ended.stderr.startswith("detent: Channel Access cannot be served: ")
     assert "choose another --ca-port or --interfaces" in ended.stderr

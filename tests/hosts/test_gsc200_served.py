@@ -47,8 +47,8 @@ def test_calls_over_a_pseudo_terminal() -> None:
             right.write_program(["S100", "T1000", "L0", "A1", "+10", "C1", "L3"])
             right.save()
             right.execute()
-            left.wait(60)
-            right.wait(60)
+            left.wait(180)
+            right.wait(180)
             assert (left.position(), right.position()) == (-1000, 30)
             saved = right.saved()
             assert saved["program"] == ["S100", "T1000", "L0", "A1", "+10", "C1", "L3"]
@@ -64,12 +64,12 @@ def test_coroutines_over_a_pseudo_terminal_one_waits_while_the_other_moves() -> 
             right = AsyncGsC200(second, port)
             await left.set_speeds(Speeds(200, 5000, 0.1))
             await asyncio.gather(left.move_to(2000), right.move_by(-5))
-            await asyncio.gather(left.wait(60), right.wait(60))
+            await asyncio.gather(left.wait(180), right.wait(180))
             assert await left.position() == 2000
             assert await right.position() == -5
             await left.run_at(-3000)
             await left.stop()
-            await left.wait(60)
+            await left.wait(180)
             assert await left.position() < 2000
 
     with served() as address:

@@ -52,7 +52,7 @@ def ask(
 
 
 def http_connection(served: HttpControl) -> http.client.HTTPConnection:
-    return http.client.HTTPConnection(served.address.host, served.address.port, timeout=60)
+    return http.client.HTTPConnection(served.address.host, served.address.port, timeout=180)
 
 
 def test_the_interface_describes_itself_as_openapi(served: HttpControl) -> None:
@@ -72,7 +72,7 @@ def test_the_interface_describes_itself_as_openapi(served: HttpControl) -> None:
 
 def raw(served: HttpControl, data: bytes) -> bytes:
     """The whole answer to `data`."""
-    with socket.create_connection(served.address[:2], timeout=60) as connected:
+    with socket.create_connection(served.address[:2], timeout=180) as connected:
         connected.sendall(data)
         connected.shutdown(socket.SHUT_WR)
         answer = b""
@@ -326,7 +326,7 @@ def test_whoever_waits_when_it_ends_is_told_and_idle_clients_hold_nothing_up() -
 
 
 def test_slow_clients_cost_nobody_a_place_they_leave_when_another_comes(served: HttpControl) -> None:
-    slow = [socket.create_connection(served.address[:2], timeout=60) for _ in range(MOST_CLIENTS)]
+    slow = [socket.create_connection(served.address[:2], timeout=180) for _ in range(MOST_CLIENTS)]
     for one_of_them in slow:
         one_of_them.sendall(b"POST /state HTTP/1.1\r\nHost: 127")
     assert ask(served, "GET", "/state")[0] == 200
@@ -344,7 +344,7 @@ def test_slow_clients_cost_nobody_a_place_they_leave_when_another_comes(served: 
 
 
 def test_clients_that_take_no_answer_cost_nobody_a_place(served: HttpControl) -> None:
-    slow = [socket.create_connection(served.address[:2], timeout=60) for _ in range(MOST_CLIENTS + 20)]
+    slow = [socket.create_connection(served.address[:2], timeout=180) for _ in range(MOST_CLIENTS + 20)]
     for one_of_them in slow:
         with contextlib.suppress(OSError):  # sent away already
             one_of_them.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
@@ -357,7 +357,7 @@ def test_more_than_so_many_cannot_wait_and_those_who_leave_make_room(served: Htt
     ask(served, "POST", "/pause")
     body = b'{"time": "100 s"}'
     said = b"POST /wait HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body)
-    waiting = [socket.create_connection(served.address[:2], timeout=60) for _ in range(MOST_WAITING)]
+    waiting = [socket.create_connection(served.address[:2], timeout=180) for _ in range(MOST_WAITING)]
     for one_of_them in waiting:
         one_of_them.sendall(said)
     short = {"time": "100 s", "timeout": "1 ms"}
@@ -395,7 +395,7 @@ def test_a_step_ends_when_the_client_who_asked_leaves() -> None:
         http = HttpControl(control, ANY)
         ask(http, "POST", "/pause")
         body = b'{"time": 1e6}'
-        client = socket.create_connection(http.address[:2], timeout=60)
+        client = socket.create_connection(http.address[:2], timeout=180)
         client.sendall(b"POST /step HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: %d\r\n\r\n%s" % (len(body), body))
         while control._stepping is None:
             ask(http, "GET", "/faults")
@@ -418,7 +418,7 @@ def test_it_ends_at_once_whatever_its_clients_are_about() -> None:
             b'POST /step HTTP/1.1\r\nHost: localhost\r\nContent-Length: 13\r\n\r\n{"time": 1e6}',
             b'POST /wait HTTP/1.1\r\nHost: localhost\r\nContent-Length: 13\r\n\r\n{"time": 1e9}',
         ):  # fmt: skip
-            client = socket.create_connection(http.address[:2], timeout=60)
+            client = socket.create_connection(http.address[:2], timeout=180)
             client.sendall(said)
             clients.append(client)
         until_waiting(control)
@@ -453,7 +453,7 @@ def test_what_two_readers_could_read_in_two_ways_is_turned_away(served: HttpCont
 
 
 def test_a_client_that_asks_first_whether_it_may_send_its_body_is_told_so(served: HttpControl) -> None:
-    with socket.create_connection(served.address[:2], timeout=60) as client:
+    with socket.create_connection(served.address[:2], timeout=180) as client:
         client.sendall(b"POST /faults HTTP/1.1\r\nHost: localhost\r\nExpect: 100-continue\r\nContent-Length: 2\r\n\r\n")
         assert client.recv(25, socket.MSG_WAITALL) == b"HTTP/1.1 100 Continue\r\n\r\n"
         client.sendall(b"{}")

@@ -224,7 +224,7 @@ def test_the_process_beside_the_loop_ends_with_it() -> None:
     with theirs:
         process = subprocess.Popen([sys.executable, "-I", "-S", unsettler.__file__], stdin=theirs)
     ours.close()
-    assert process.wait(60) == 0
+    assert process.wait(180) == 0
 
 
 def unusual(descriptor: int) -> None:
