@@ -14,6 +14,7 @@ from detent.workbench.beginning import Beginning
 from detent.workbench.drafts import Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
+from detent.workbench.newcell import NewCell, NewMotor, NewUnit
 
 CELL = 'title = "{}"\n[units.x]\nmodel = "gs-c200"\n'
 
@@ -54,3 +55,15 @@ def test_cell_files_are_read_beside_the_loop_and_each_once_for_as_long_as_it_sta
     (tmp_path / "a.toml").unlink()
     assert cells() == [["b.toml", "C"]]
     assert read == [("b.toml", False)]
+
+
+def test_every_motor_fits_every_axis_of_a_new_cell_with_the_supply_that_is_proposed(tmp_path: Path) -> None:
+    """A GenStepper board puts its supply through the winding: 24 V would burn each of them."""
+    fittings: Any = asyncio.run(begun(tmp_path).fittings())
+    assert fittings["uncontrolled"] == ["bs0610", "bs0710"]
+    for model, axes in fittings["axes"].items():
+        supplies = fittings["direct" if model in fittings["uncontrolled"] else "supplies"]
+        for name in fittings["motors"]:
+            motors = [NewMotor(unit="unit", axis=axis, motor=name, supply=supplies[name]) for axis in axes]
+            text = NewCell(units=[NewUnit(name="unit", model=model)], motors=motors).text()
+            assert text.count(name) == len(axes)

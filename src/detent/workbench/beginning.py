@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +11,8 @@ from pydantic import Field
 from detent.cell.build import build
 from detent.cell.description import parse, single
 from detent.controllers import catalogue
+from detent.controllers.catalogue import NO_LIMITS
+from detent.controllers.genstepper.supply import MOTOR_VOLTS
 from detent.motors.named import MOTORS
 from detent.realtime.examples import home
 from detent.realtime.images import cell_name
@@ -17,12 +20,14 @@ from detent.realtime.texts import read_text
 from detent.workbench.drafts import Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
-from detent.workbench.newcell import NewCell, jacks
+from detent.workbench.newcell import NewCell, NewMotor, NewUnit, jacks
 
 if TYPE_CHECKING:
     from detent.workbench.client import Bench
 
 Name = Annotated[str, Field(max_length=1000)]
+SUPPLY = 24  # V, where a drive controls the current
+LEAST = MOTOR_VOLTS[0]  # that the motors of a GenStepper board have
 EXAMPLE = "example:"  # before the name of one, where a target is asked for
 
 
@@ -85,9 +90,16 @@ class Beginning:
         return await asyncio.to_thread(jacks)
 
     async def fittings(self) -> dict[str, object]:
-        """What units of a new cell can have: motors, by name; axes of each model that moves something, and programs."""
+        """What units of a new cell can have: motors, by name; axes of each model that moves something, and programs.
+
+        `supplies`: the V to begin with for a motor; in `direct` of the models that put the supply through the winding.
+        """
+        known = {name: motor for name, motor in MOTORS.items() if motor.inertia}  # of others no motion can be computed
         return {
-            "motors": list(MOTORS),
+            "motors": list(known),
+            "supplies": dict.fromkeys(known, SUPPLY),
+            "direct": {name: max(LEAST, round(motor.current * motor.resistance, 1)) for name, motor in known.items()},
+            "uncontrolled": await asyncio.to_thread(_uncontrolled),
             "axes": await asyncio.to_thread(lambda: {name: _axes(name) for name in catalogue.MODELS}),
             "programs": [name for name, model in catalogue.MODELS.items() if model.language is not None],
         }
@@ -115,6 +127,23 @@ class Beginning:
             {"command": row.command, "argument": row.argument, "what": row.what, "section": row.section}
             for row in catalogue.model(model).commands()
         ]
+
+
+@cache
+def _uncontrolled() -> list[str]:
+    """The models that put the supply through the winding, without current control: whose motors it would burn."""
+    motor, found = min(MOTORS, key=lambda name: MOTORS[name].current), list[str]()
+    for model, known in catalogue.MODELS.items():
+        if known.limits.motor_supply == NO_LIMITS.motor_supply:
+            continue  # it has no power stage of its own: a drive follows it
+        for axis in _axes(model)[:1]:
+            unit = NewUnit(name="unit", model=model)
+            fitted = NewMotor(unit="unit", axis=axis, motor=motor, supply=SUPPLY)
+            try:
+                NewCell(units=[unit], motors=[fitted]).text()
+            except ValueError:
+                found.append(model)
+    return found
 
 
 def _axes(model: str) -> list[str]:

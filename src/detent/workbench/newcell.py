@@ -100,8 +100,8 @@ class NewCell(_Chosen):
             name = f"{motor.unit}_{motor.axis}" if motor.axis else f"{motor.unit}_motor"
             lines += [f"[motors.{_key(name)}]", f"unit = {_string(motor.unit)}"]
             lines += [f"axis = {_string(motor.axis)}"] * bool(motor.axis)
-            lines += [f"motor = {_string(motor.motor)}", f"supply = {motor.supply:g}"]
-            lines += [f"lead = {motor.lead:g}"] * (motor.lead is not None) + [""]
+            lines += [f"motor = {_string(motor.motor)}", f"supply = {_number(motor.supply)}"]
+            lines += ([] if motor.lead is None else [f"lead = {_number(motor.lead)}"]) + [""]
         text = "\n".join(lines).rstrip() + "\n"
         try:
             build(parse(text, "the new cell"), read or _no_file)
@@ -136,6 +136,11 @@ def _key(name: str) -> str:
 
 def _string(text: str) -> str:
     return '"' + re.sub(r'[\x00-\x1f\x7f"\\]', lambda found: f"\\u{ord(found[0]):04X}", text) + '"'
+
+
+def _number(value: float) -> str:
+    short = f"{value:g}"
+    return short if float(short) == value else repr(value)
 
 
 def _strings(texts: list[str]) -> str:

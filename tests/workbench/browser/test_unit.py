@@ -25,7 +25,7 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.fixture
 def bench(chromium: object, serve: Callable[..., Served], real: str) -> Served:
-    return serve("dcb-274", real)
+    return serve("dcb-274", real, "--patience", "10")  # a loaded computer pauses between two characters
 
 
 def test_the_panel_shows_what_the_unit_tells_and_a_hand_moves_it(windows: Windows, bench: Served, real: str) -> None:

@@ -10,7 +10,7 @@ part("begin", (box) => {
   /** @type {Record<string, Record<string, string[]>>} model -> the pins of each side, and its straps */
   let jacks = {};
   /** @type {{motors: string[], axes: Record<string, string[]>, programs: string[]}} what can be fitted to a model */
-  let fittings = { motors: [], axes: {}, programs: [] };
+  let fittings = { motors: [], supplies: {}, direct: {}, uncontrolled: [], axes: {}, programs: [] };
   /** @type {{title: string, units: any[], wires: {source: string, target: string}[], switches: any[], motors: any[]}} */
   let cell = { title: "", units: [], wires: [], switches: [], motors: [] };
   /** @type {Set<string>} */
@@ -34,6 +34,7 @@ part("begin", (box) => {
     const made = worded("button", name, text);
     made.type = "button";
     if (help) made.dataset.help = help;
+    if (help && !/[a-z]/i.test(text)) made.setAttribute("aria-label", help); // a sign is no name
     made.addEventListener("click", action);
     return made;
   }
@@ -196,10 +197,13 @@ part("begin", (box) => {
       const row = worded("div", "row wrap");
       row.append(field(`Motor ${axis}`.trim(), choice(["", ...fittings.motors], motor ? motor.motor : ""), (value) => {
         cell.motors = cell.motors.filter((one) => one !== motor);
-        if (value) cell.motors.push({ supply: 24, lead: null, ...motor, unit: unit.name, axis, motor: value });
+        /** @param {string} name */
+        const usual = (name) => fittings[fittings.uncontrolled.includes(unit.model) ? "direct" : "supplies"][name];
+        const supply = motor && motor.supply !== usual(motor.motor) ? motor.supply : usual(value);
+        if (value) cell.motors.push({ lead: null, ...motor, supply, unit: unit.name, axis, motor: value });
       }));
       if (motor) {
-        row.append(field("Supply, V", input(motor.supply, "number"), (value) => (motor.supply = Number(value) || 24)));
+        row.append(field("Supply, V", input(motor.supply, "number"), (value) => (motor.supply = Number(value) || motor.supply)));
         row.append(field("Lead, mm or \u00b0 a step", input(motor.lead, "number"), (value) => (motor.lead = Number(value) || null)));
       }
       box.append(row);
