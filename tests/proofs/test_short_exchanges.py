@@ -15,7 +15,7 @@ from tests.proofs.units import BY_NAME, Strict
 
 from detent.ticks import MS
 
-A_FEW, MANY = 20, 1500
+A_FEW, MANY = 20, 400
 LISTENS: Final = 60 * MS
 
 PRINTED: Final = b"0159ABCDEFGHIKLMNOPQRSTUVWXYZ+-@^!?*/=<>.,:;#%&$_`[]\\ abehlrtwx~"
@@ -93,4 +93,4 @@ def test_no_two_or_three_characters_end_a_unit(name: str, state: str) -> None:
 def test_no_pair_of_control_characters_and_no_three_of_many_more_end_a_unit(
     name: str, state: str, options: int
 ) -> None:
-    hold(name, state, options, [*pairs(), *some(Random(f"{name} {state} {options}"), MANY)])
+    hold(name, state, options, pairs() if options == 0 else some(Random(f"{name} {state} {options}"), MANY))
