@@ -67,7 +67,7 @@ class Board(_Table):
     lead: DurationField = 30 * MS
     """What leaves the pins is so long behind the cell: 3 to 500 ms, the same on all boards of a cell."""
     margin: DurationField | None = None
-    """A pulse that would be due in less is late, and the rest of its axis slips: 1 ms to a third of the lead; left out:
+    """A pulse that would be due in less is late, and the rest of its unit slips: 1 ms to a third of the lead; left out:
     4 ms, or a third of a shorter lead."""
     error: ErrorField = 1 * US
     """How far a pulse may be from its time, 100 us at most; `exact`: the nearest tick."""

@@ -133,7 +133,7 @@ class BoardSetup:
     """Everything on one board, and how it is driven.
 
     `lead`: what leaves the pins is so long behind the cell. `error`: of a pulse, at most. A pulse that would be due in
-    less than `margin` from now is late: the rest of its axis slips (see `Stepper`).
+    less than `margin` from now is late: the rest of its unit slips (see `Lag`).
     """
 
     name: str
