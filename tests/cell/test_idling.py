@@ -112,6 +112,26 @@ def test_a_year_of_a_loop_is_soon_over(name: str) -> None:
     assert YEAR < following < YEAR + 2 * SECOND
 
 
+@pytest.mark.parametrize(
+    ("model", "program", "options"),
+    [
+        ("gs-c200s", "a: I1\nj a\n", 'instruction_time = "150 us"'),  # RESET is pulsed anew before it has risen
+        ("gs-c200s", "a: I1\nj a\n", 'instruction_time = "399 us"'),
+        ("gs-c200s", "a: A1\nC1\nj a\n", 'instruction_time = "1 us"'),
+        ("dcb-274", "L 0 0\n", 'execution_times = "off"'),
+        ("dcb-274", "a: W 0\nA 8\nA 0\nG a\n", 'execution_times = "off"'),
+    ],
+)
+def test_loops_of_units_that_are_quicker(model: str, program: str, options: str) -> None:
+    stepped, run = (one(model, program, f"options = {{ {options} }}\n") for _ in range(2))
+    step_to(stepped, 60 * MS + 7)
+    run.run_to(60 * MS + 7)
+    assert list(told(run)) == list(told(stepped))
+    assert state(run) == state(stepped)
+    assert passed_over(run) > 0
+    run.run_to(YEAR)
+
+
 @pytest.mark.parametrize("name", BUSY)
 def test_what_moves_or_ends_is_run_through(name: str) -> None:
     cell = one(*BUSY[name])

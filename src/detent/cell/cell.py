@@ -117,8 +117,7 @@ class Cell:
         if stirred or idling.pass_over(circuit, min(until, self._script_deadline), most):
             return idling.FIRST, idling.LEAST
         most = min(2 * most, idling.MOST)
-        # one more: another place of a loop, where it may be that no pulse of an output is on its way
-        return most * idling.PATIENCE + 1, most
+        return most * idling.PATIENCE, most
 
     def step(self) -> Ns | None:
         """Let everything of the next eventful instant happen; return it, None if nothing is left to do."""

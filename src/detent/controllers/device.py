@@ -296,9 +296,9 @@ class Looping(Controller, Protocol):
     def only_its_program(self, now: Ns) -> bool:
         """Whether nothing is under way in it at `now` but a program that will go on by itself at the next deadline.
 
-        Nothing moves, nothing is being said, no pulse of an output is on its way, and nothing that is over matters any
-        more. What it does from there on depends on how it is now, and not on what time it is.
+        Nothing moves, nothing is being said, and nothing that is over matters any more. What it does from there on
+        depends on how it is now, and not on what time it is.
         """
 
     def postpone(self, by: Ns) -> None:
-        """Let its program go on so much later: for a device that does only that."""
+        """Let its program go on so much later, and whatever this has begun: for a device that does only that."""

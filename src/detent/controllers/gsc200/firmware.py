@@ -214,13 +214,13 @@ class GsC200(OneAxis):
             self._running.run(self._ram, now)
 
     def only_its_program(self, now: Ns) -> bool:
-        """Neither a move, nor the pulse of RESET or a clock, nor an answer is under way."""
+        """Neither a move nor an answer is under way."""
         only = self._transmitter.deadline >= NEVER and self._kept is None and self._transmitter.busy_until <= now
         return only and self._running.only_its_timer
 
     def postpone(self, by: Ns) -> None:
         """The next instruction is reached so much later."""
-        self._running.timer += by
+        self._running.postpone(by)
 
     def halt(self, now: Ns) -> None:
         """As K."""

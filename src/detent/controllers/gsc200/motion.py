@@ -56,6 +56,17 @@ class Motion:
         return self.course is Course.REST
 
     @property
+    def only_reset(self) -> bool:
+        """Whether it is at rest, and nothing but RESET changes by itself."""
+        return self.course is Course.REST and self._clock_rises >= NEVER
+
+    def postpone(self, by: Ns) -> None:
+        """RESET, if it is low, rises so much later."""
+        if self._reset_rises < NEVER:
+            self._reset_rises += by
+            self._plan()
+
+    @property
     def direction(self) -> int:
         """+1 or -1: of the motion under way, or of the last one."""
         return self._axis.direction

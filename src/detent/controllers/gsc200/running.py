@@ -58,8 +58,13 @@ class Running:
 
     @property
     def only_its_timer(self) -> bool:
-        """Whether a program runs and waits for nothing but the next instruction, at rest."""
-        return self.timer < NEVER and self._motion.at_rest and self._motion.deadline >= NEVER
+        """Whether a program runs and waits for nothing but the next instruction, at rest; RESET may be low."""
+        return self.timer < NEVER and self._motion.only_reset
+
+    def postpone(self, by: Ns) -> None:
+        """The next instruction is reached so much later, and RESET rises so much later."""
+        self.timer += by
+        self._motion.postpone(by)
 
     def rounds(self) -> list[tuple[int, int]]:
         """The loops that the program is in, outermost first: the address of the L, and which round it is."""
