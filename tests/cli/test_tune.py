@@ -2,12 +2,18 @@
 
 import csv
 import json
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from detent.cli import main
+from detent.cli import tune as verb
+from detent.tuner.search import Progress
 
 RIG = ["--motor", "qsh4218-41-10-035", "--inertia", "1.5e-5", "--friction", "0.02"]
 
@@ -127,3 +133,84 @@ def test_a_batch_answers_row_by_row_and_a_row_without_answer_says_why(
 def test_processes_that_share_the_work_take_no_gpu(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["tune", "gs-c200", *RIG, "--moves", "60", "--gpu", "--workers", "2"]
     assert "leave one of them out" in run(capsys, *words, code=2)
+
+
+SMALL = ["--variants", "64", "--no-corners", "--no-gpu"]
+
+
+@pytest.fixture
+def ctrl_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Presses Ctrl-C, for real, when the work says that it is at a stage (how what it does begins)."""
+
+    def at(stage: str) -> None:
+        @contextmanager
+        def watched() -> Iterator[Callable[[Progress], None]]:
+            def watch(step: Progress) -> None:
+                if step.doing.startswith(stage) and (stage != "looking" or step.best is not None) and not pressed:
+                    pressed.append(step)
+                    os.kill(os.getpid(), signal.SIGINT)
+
+            yield watch
+
+        monkeypatch.setattr(verb, "_watch", watched)
+
+    pressed: list[Progress] = []
+    return at
+
+
+@pytest.mark.parametrize(
+    ("stage", "proved"),
+    [
+        pytest.param("looking", False, marks=pytest.mark.slow),
+        pytest.param("at ", False, marks=pytest.mark.slow),
+        pytest.param("comparing", True, marks=pytest.mark.slow),
+        ("map", True),
+    ],
+)
+def test_ctrl_c_loses_nothing_that_is_known(
+    stage: str, proved: bool, ctrl_c: Callable[[str], None], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    ctrl_c(stage)
+    program, picture = tmp_path / "tuned.gsc", tmp_path / "map.csv"
+    with pytest.raises(SystemExit) as ended:
+        main(
+            ["tune", "gs-c200", *RIG, "--moves", "60", *SMALL, "--map", str(picture), "--into", str(program), "--json"]
+        )
+    assert ended.value.code == 130
+    told = capsys.readouterr()
+    found = json.loads(told.out)
+    assert found["complete"] is proved
+    assert [line[0] for line in found["commands"]] == ["S", "T", "R"]
+    (line,) = told.err.splitlines()
+    assert line.startswith("detent: stopped; ")
+    assert line.endswith(" not written")
+    assert str(picture) in line
+    assert not picture.exists()
+    # what nothing has proved goes into no program
+    assert program.exists() is proved
+    assert (str(program) in line) is not proved
+
+
+def test_ctrl_c_before_anything_is_known_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @contextmanager
+    def pressed() -> Iterator[Callable[[], bool]]:
+        yield lambda: True
+
+    monkeypatch.setattr(verb, "_interruptible", pressed)
+    told = run(capsys, "tune", "gs-c200", *RIG, "--moves", "60", *SMALL, code=130)
+    assert told == "detent: stopped before any setting without loss was known\n"
+
+
+def test_ctrl_c_between_moves_keeps_what_is_known_of_the_first(
+    ctrl_c: Callable[[str], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    ctrl_c("comparing")
+    with pytest.raises(SystemExit) as ended:
+        main(["tune", "gs-c200", *RIG, "--moves", "60,90", "--each-move", *SMALL, "--json"])
+    assert ended.value.code == 130
+    told = capsys.readouterr()
+    (first,) = json.loads(told.out)["each_move"]
+    assert first["complete"]
+    assert told.err == "detent: stopped; nothing is known of moves of 90 steps\n"

@@ -2,8 +2,11 @@
 
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -76,6 +79,71 @@ def test_nobody_at_the_address() -> None:
 
     with pytest.raises(WorkersLost, match=r"--scheduler tcp://127.0.0.1:1: nobody answers"):
         Workers(scheduler="tcp://127.0.0.1:1", patience=1)
+
+
+PRESSED = """
+import os, signal, sys
+from detent.realtime.workers import Workers
+
+def square(_, pieces):
+    return [piece * piece for piece in pieces]
+
+pressed = []
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, lambda *_: pressed.append(1))
+    with Workers(2) as workers:
+        before = workers.names()
+        answers = workers.map(square, None, range(40), chunk=1)
+        found = [next(answers)]
+        os.kill(next(iter(before.values())), signal.SIGKILL)  # whoever comes in its place hears nothing either
+        while len(now := workers.names()) < 2 or now == before:
+            pass
+        os.killpg(0, signal.SIGINT)
+        found += answers
+        assert workers.names() == now, "a worker has heard it"
+    assert found == [k * k for k in range(40)]
+    assert pressed == [1]
+    print("whole", *now.values())
+"""
+
+
+def test_workers_do_not_hear_ctrl_c(tmp_path: Path) -> None:
+    """A terminal sends it to all processes: who has started them decides what to do, and ends them."""
+    script = tmp_path / "pressed.py"
+    script.write_text(PRESSED)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=240, start_new_session=True)
+    assert done.returncode == 0, done.stderr
+    word, *workers = done.stdout.split()
+    assert word == "whole"
+    assert done.stderr == ""
+    for worker in workers:
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(worker), 0)
+
+
+def test_a_scheduler_that_is_gone_is_told() -> None:
+    from detent.realtime.workers import Workers, WorkersLost
+
+    with ExitStack() as stack:
+        command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
+                   "--no-dashboard"]  # fmt: skip
+        scheduler = stack.enter_context(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
+        stack.callback(scheduler.kill)
+        assert scheduler.stderr is not None
+        address = next(line.split()[-1] for line in scheduler.stderr if "Scheduler at:" in line)
+        work = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-dashboard"]
+        worker = stack.enter_context(subprocess.Popen(work, stderr=subprocess.DEVNULL))
+        stack.callback(worker.kill)
+        workers = stack.enter_context(Workers(scheduler=address))
+        answers = workers.map(_squares, None, range(1000), chunk=1)
+        assert next(answers) == 0
+        scheduler.kill()
+        with pytest.raises(WorkersLost, match="the scheduler answers no more"):
+            list(answers)
+
+
+def _squares(_: object, pieces: list[int]) -> list[int]:
+    return [piece * piece for piece in pieces]
 
 
 def test_the_tuner_gives_the_same_answer_and_map(workers: Any) -> None:

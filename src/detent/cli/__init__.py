@@ -118,7 +118,7 @@ def main(tokens: Sequence[str] | None = None) -> None:
     except BrokenPipeError:
         _nobody_reads()
     except OSError as error:  # of a file that a verb has not looked for: a name that is too long, a disk that is gone
-        endings.failed(f"{error.filename}: {error.strerror}" if error.filename else error.strerror or error)
+        endings.failed(endings.of_system(error))
     except KeyboardInterrupt:
         sys.exit(130)
     finally:

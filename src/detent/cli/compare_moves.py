@@ -57,7 +57,7 @@ def compare_moves(
     json
         Print everything as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly, failed
+    from detent.cli.endings import asked_wrongly, failed, of_system
     from detent.cli.rig import made, read_by, spread_of
     from detent.moves.law import winding_of
     from detent.moves.spelling import read
@@ -87,7 +87,7 @@ def compare_moves(
     except ImportError as error:
         failed(error)
     except OSError as error:
-        failed(f"{error.filename}: {error.strerror}")
+        failed(of_system(error))
     if json:
         facts = [_facts(task, row) for row in rows]
         about = {"model": model, "motor": found.motor.name, "assumed": list(found.words), "seed": seed}

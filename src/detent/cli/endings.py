@@ -12,6 +12,12 @@ def tell(text: object) -> None:
     print(f"detent: {shown}", file=sys.stderr, flush=True)
 
 
+def of_system(error: OSError) -> str:
+    """What the system has said, with the file that it is about, if it is about one."""
+    what = error.strerror or str(error) or type(error).__name__
+    return f"{error.filename}: {what}" if error.filename else what
+
+
 def asked_wrongly(error: Exception | str) -> NoReturn:
     """Say what is wrong in one line on stderr and exit with 2."""
     tell(error)

@@ -83,7 +83,7 @@ def motor(
     json
         Print everything as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly, failed
+    from detent.cli.endings import asked_wrongly, failed, of_system
     from detent.cli.rig import made, read_by, spread_of
     from detent.motors.motor import MotorError
 
@@ -119,7 +119,7 @@ def motor(
     except ImportError as error:
         failed(error)
     except OSError as error:
-        failed(f"{error.filename}: {error.strerror}")
+        failed(of_system(error))
 
 
 def _facts_of(found: Made) -> dict[str, Any]:

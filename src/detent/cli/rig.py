@@ -268,6 +268,8 @@ def _ring_down(rig: "Rig", text: str) -> Any:
     from detent.motors import ring_down
     from detent.motors.motor import MotorError
 
+    if not text.strip():
+        raise MotorError("--ring-down: give overshoot and settling time, like 0.45,0.03, or a CSV file")
     parts = [part.strip() for part in text.split(",")]
     try:
         numbers = [float(part.removesuffix("%")) / (100 if part.endswith("%") else 1) for part in parts]

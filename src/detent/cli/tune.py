@@ -3,7 +3,7 @@
 import json as json_text
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from detent.tuner.into import Changed
     from detent.tuner.search import Cancelled, Watch
     from detent.tuner.spaces import Profile
-    from detent.tuner.task import Task
+    from detent.tuner.task import Move, Task
     from detent.tuner.tune import Tuned
 
 INTERRUPTED = 130
@@ -100,11 +100,12 @@ def tune(
     json
         Print everything as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly, failed
+    from detent.cli.endings import asked_wrongly, failed, of_system, tell
     from detent.cli.rig import made, read_by, spread_of
     from detent.moves.law import winding_of
     from detent.tuner import tune as tuning
-    from detent.tuner.spaces import space
+    from detent.tuner.judge import judge_of
+    from detent.tuner.search import Stopped
     from detent.tuner.task import Task, check_rig, moves_of
 
     try:
@@ -132,28 +133,40 @@ def tune(
         task = Task(model, check_rig(found.rig, found.motor.name), asked, options, axis, spread_of(vary), seed,
                     not no_corners, final=variants)  # fmt: skip
         if into is not None:
-            first = space(task)
+            first = judge_of(task).space
             _changed(task, first.profile(first.hand), from_)  # what cannot be written is told before the work
-        with _interruptible() as cancelled, _divided(workers, scheduler) as divided, _watch() as watch:
+        with _interruptible() as cancelled, _divided(workers, scheduler) as divided:
             do: Any = tuning.each_move if each_move else tuning.tune
-            done = do(task, watch=watch, cancelled=cancelled, **divided)
+            with _watch() as watch:
+                done = do(task, watch=watch, cancelled=cancelled, **divided)
             answers: list[Tuned] = done if each_move else [done]
-            if answers[0].found.whole and map_:
-                _map(answers[0], map_, watch, cancelled, divided)
-        if into is not None:
-            _into(answers[0], into, from_)
+            if json:
+                facts = [_facts(one, found) for one in answers]
+                print(json_text.dumps({"each_move": facts} if each_move else facts[0]), flush=True)
+            else:
+                _print(answers, found)  # before files are written: whatever becomes of these, it is told
+            left = list(outputs)
+            if answers[0].found.whole:  # what nothing has proved goes into no file
+                if into is not None:
+                    _into(answers[0], into, from_)
+                    left.remove(into)
+                if map_ and not cancelled() and _map(answers[0], map_, cancelled, divided):
+                    left = []
+            stopped = cancelled()
+    except Stopped as error:
+        tell(error)
+        raise SystemExit(INTERRUPTED) from None
     except ValueError as error:  # TunerError, MotorError, SettingError, CatalogueError
         asked_wrongly(error)
     except ImportError as error:
         failed(error)
     except OSError as error:
-        failed(f"{error.filename}: {error.strerror}")
-    if json:
-        facts = [_facts(one, found) for one in answers]
-        print(json_text.dumps({"each_move": facts} if each_move else facts[0]))
-    else:
-        _print(answers, found, [str(path) for path in outputs])
-    if not all(one.found.whole for one in answers):
+        failed(of_system(error))
+    for path in outputs if not json else ():
+        if path not in left:
+            print(f"Wrote {path}")
+    if stopped:
+        _say_what_is_missing(answers, asked, left)
         raise SystemExit(INTERRUPTED)
 
 
@@ -281,13 +294,19 @@ def _watch() -> "Iterator[Watch]":
         yield watch
 
 
-def _map(tuned: "Tuned", paths: list[Path], watch: "Watch", cancelled: "Cancelled", divided: dict[str, Any]) -> None:
+def _map(tuned: "Tuned", paths: list[Path], cancelled: "Cancelled", divided: dict[str, Any]) -> bool:
+    """Draw it; whether it was not stopped."""
     from detent.outputs import tuning_figures
     from detent.outputs.files import write_whole
     from detent.tuner.map import loss_map
+    from detent.tuner.search import Stopped
 
     more = {"run": divided["run"], "together": 16 * divided["ahead"]} if divided else {}
-    found = loss_map(tuned.task, tuned.found.point, watch=watch, cancelled=cancelled, **more)
+    try:
+        with _watch() as watch:
+            found = loss_map(tuned.task, tuned.found.point, watch=watch, cancelled=cancelled, **more)
+    except Stopped:
+        return False
     for path in paths:
         if path.suffix.lower() == ".csv":
             write_whole(path, found.csv().encode())
@@ -297,6 +316,7 @@ def _map(tuned: "Tuned", paths: list[Path], watch: "Watch", cancelled: "Cancelle
         about = f"moves of {moves} steps  \N{MIDDLE DOT}  {found.variants} variants a point  \N{MIDDLE DOT}  "
         tuning_figures.write_map(path, found.x, found.y, found.lost, found.times, found.chosen, names=found.names,
                                  labels=found.labels, title=title, about=about + str(tuned.found.profile))  # fmt: skip
+    return True
 
 
 def _changed(task: "Task", profile: "Profile | None", from_: Path | None) -> "Changed":
@@ -324,6 +344,19 @@ def _into(tuned: "Tuned", into: Path, from_: Path | None) -> None:
         print(f"{into}: {', '.join(changed.replaced)}", file=sys.stderr)
 
 
+def _say_what_is_missing(answers: "list[Tuned]", moves: "Sequence[Move]", files: Sequence[Path]) -> None:
+    """What a Ctrl-C has left out, in one line."""
+    from detent.cli.endings import tell
+
+    words = []
+    behind = moves[len(answers) :] if len(answers[0].task.moves) < len(moves) else ()  # of --each-move
+    if behind:
+        words.append(f"nothing is known of moves of {', '.join(str(move.steps) for move in behind)} steps")
+    if files:
+        words.append(f"{', '.join(map(str, files))} not written")
+    tell("; ".join(["stopped", *words]))
+
+
 # -- what is printed ----------------------------------------------------------------------------------------
 
 
@@ -334,7 +367,7 @@ def _facts(tuned: "Tuned", made: Made) -> dict[str, Any]:
     return {**facts(tuned), "assumed": list(made.words), "gpu": gpu.used()}
 
 
-def _print(answers: "list[Tuned]", made: Made, outputs: list[str]) -> None:
+def _print(answers: "list[Tuned]", made: Made) -> None:
     from detent.cli.motor import ranges_of
     from detent.motors import gpu
 
@@ -348,9 +381,7 @@ def _print(answers: "list[Tuned]", made: Made, outputs: list[str]) -> None:
     print("assumed: " + "; ".join(made.words))
     if gpu.used():
         print("judged on the GPU where many variants were asked at once")
-    for path in outputs:
-        if Path(path).exists():
-            print(f"Wrote {path}")
+    sys.stdout.flush()
 
 
 def _print_one(tuned: "Tuned") -> None:
@@ -388,8 +419,10 @@ def _print_one(tuned: "Tuned") -> None:
             print("         no longer ramp makes it safe")
         elif tuned.safe_hand != tuned.hand:
             print(f"         made safe: {tuned.safe_hand.profile}")
-    print("bound:   what torque allows at its worst corner, from and to standstill; "
-          f"found takes {tuned.ratio:.2f} times that")  # fmt: skip
+    beside = f"found takes {tuned.ratio:.2f} times that"
+    if tuned.ratio < 1:  # a bound is of rotors that never lag, and a step or two are made by lagging
+        beside = "so short a move has had its last pulse before that, with the rotor still on its way"
+    print(f"bound:   what torque allows at its worst corner, from and to standstill; {beside}")
     if task.both_ways:
         print("judged in both directions, as the load pulls")
     if tuned.fails:

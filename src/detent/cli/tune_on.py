@@ -197,6 +197,8 @@ def _carried_out(
     shell: "Blocking", plan: "Plan", bench: "Bench", log: Any, machine: MachineOptions, *, quiet: bool
 ) -> "Result":
     """The run, logged and told. Ctrl-C stops the axis through its ramp, a second one at once."""
+    from detent.hosts.errors import DriverError
+    from detent.tuner.machine.carriage import MachineError
     from detent.tuner.machine.recipe import Trial
     from detent.tuner.machine.session import replayed, run
 
@@ -215,15 +217,18 @@ def _carried_out(
 
     try:
         return shell.perform(run(plan, bench, record, log.past))
-    except KeyboardInterrupt:
-        _stop(shell, bench)
+    except (MachineError, DriverError):
+        _leave_safe(shell, plan, bench)
+        raise
+    except (KeyboardInterrupt, SystemExit):  # SIGTERM is the latter
+        _stop(shell, plan, bench)
         print(f"  the log is {log.path}; with the carriage on the witness the same command goes on from it",
               file=sys.stderr)  # fmt: skip
         raise
 
 
-def _stop(shell: "Blocking", bench: "Bench") -> None:
-    """Stop the axis, whatever else is pressed, and say whether it stands."""
+def _stop(shell: "Blocking", plan: "Plan", bench: "Bench") -> None:
+    """Stop the axis, whatever else is pressed, and say whether it stands, and with which settings."""
     from detent.hosts.errors import DriverError
 
     print("detent: stopping the axis", file=sys.stderr)
@@ -238,6 +243,23 @@ def _stop(shell: "Blocking", bench: "Bench") -> None:
               "off the drive if in doubt", file=sys.stderr)  # fmt: skip
     else:
         print("detent: the axis stands", file=sys.stderr)
+        _leave_safe(shell, plan, bench)
+
+
+def _leave_safe(shell: "Blocking", plan: "Plan", bench: "Bench") -> None:
+    """Give the unit the settings again with which it began; say whether it has them."""
+    from detent.hosts.errors import DriverError
+    from detent.moves.spelling import spelled
+    from detent.tuner.machine.session import left_safe
+
+    begin = spelled(plan.law, plan.begin)
+    try:
+        shell.perform(left_safe(plan, bench))
+    except (DriverError, KeyboardInterrupt) as error:
+        why = f": {error}" if str(error) else ""
+        print(f"detent: it may have the settings of a trial{why}; give it {begin}", file=sys.stderr)
+    else:
+        print(f"detent: it has {begin} again", file=sys.stderr)
 
 
 def _ask(plan: "Plan", bench: "Bench", machine: MachineOptions, *, quiet: bool) -> None:

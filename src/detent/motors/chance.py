@@ -6,7 +6,7 @@ bound on a rate is that of Clopper and Pearson (1934), which holds for independe
 """
 
 from collections.abc import Sequence
-from math import exp, lgamma, log, log1p
+from math import log, log1p
 
 import numpy as np
 import numpy.typing as npt
@@ -58,22 +58,23 @@ def bound(lost: int, tried: int, *, looks: int = 1, confidence: float = 0.95) ->
         return 1.0
     if lost == 0:
         return -float(np.expm1(log(chance) / tried))
+    ways, counts = _ways(lost, tried), np.arange(lost + 1)
     low, high = lost / tried, 1.0
     for _ in range(60):
         middle = (low + high) / 2
-        if _at_most(lost, tried, middle) > chance:
+        if middle < 1 and _at_most(ways, counts, tried, middle) > chance:
             low = middle
         else:
             high = middle
     return high
 
 
-def _at_most(lost: int, tried: int, rate: float) -> float:
-    """The chance of `lost` or fewer in `tried`."""
-    if rate >= 1:
-        return 0.0
-    up, down = log(rate), log1p(-rate)
-    whole = lgamma(tried + 1)
-    return sum(
-        exp(whole - lgamma(k + 1) - lgamma(tried - k + 1) + k * up + (tried - k) * down) for k in range(lost + 1)
-    )
+def _ways(lost: int, tried: int) -> npt.NDArray[np.float64]:
+    """The logarithm of how many ways there are to lose 0, 1, ... `lost` of them."""
+    k = np.arange(1, lost + 1, dtype=np.float64)
+    return np.concatenate(([0.0], np.cumsum(np.log((tried - k + 1) / k))))
+
+
+def _at_most(ways: npt.NDArray[np.float64], counts: npt.NDArray[np.int64], tried: int, rate: float) -> float:
+    """The chance of so few in `tried`."""
+    return float(np.exp(ways + counts * log(rate) + (tried - counts) * log1p(-rate)).sum())

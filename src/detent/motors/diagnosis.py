@@ -116,6 +116,8 @@ def _reason(
     )
     has = f"it needs {needs} there and has {gives}"
     natural = rig.motor.natural_frequency(rig.load.inertia)
+    if available <= 1e-3 * rig.motor.holding_torque:
+        return f"the motor has no torque at this speed: {has}"
     if pulse >= count:
         return "it runs on over the stop: stop from a lower speed, or with a longer ramp"
     if needed < 0 and -needed > max(available, 0.0):

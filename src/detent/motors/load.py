@@ -69,6 +69,11 @@ class Load(Shared):
         """The torque at the start."""
         return self.torque + self.torque_by_time.at(0.0) + self.torque_by_position.at(0.0)
 
+    def ends(self) -> tuple[float, float]:
+        """A torque that it is never below, and one that it is never above."""
+        profiles = self.torque_by_time.values, self.torque_by_position.values
+        return self.torque + sum(map(min, profiles)), self.torque + sum(map(max, profiles))
+
 
 NO_LOAD = Load()
 MOST_POINTS = 100_000

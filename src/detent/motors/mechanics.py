@@ -39,7 +39,7 @@ class Mechanics:
         if len(ways) > 1:
             raise MotorError(f"mechanics: {' and '.join(ways)}: give one of screw, belt and rack")
         need("mechanics", 0, 100, open_=True, **ways)
-        need("mechanics", 0, 1e6, open_=True, gear=self.gear)
+        need("mechanics", 1e-6, 1e6, gear=self.gear)
         need("mechanics", 0, 1e6, mass=self.mass, drag=self.drag, inertia=self.inertia, friction=self.friction,
              driven_inertia=self.driven_inertia, viscous=self.viscous)  # fmt: skip
         need("mechanics", -1e6, 1e6, force=self.force)

@@ -49,7 +49,7 @@ def write_map(
                 axes.clabel(lines, fmt=lambda value: f"{value:.3g} s", fontsize=8)
         axes.plot(*chosen, marker="*", markersize=17, color=COLOURS[0], markeredgecolor="white", linestyle="none",
                   label=f"chosen: {names[0]} {chosen[0]}, {names[1]} {chosen[1]}")  # fmt: skip
-        axes.legend(loc="upper left", framealpha=0.9)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, borderpad=0)  # above: nothing is hidden
         dress(axes, *labels)
         _plain_ticks(axes)
         bar = figure.colorbar(mesh, cax=figure.add_axes((0.91, 0.1, 0.018, 0.74)))

@@ -8,7 +8,10 @@ ones cost more to carry about than to do.
 import logging
 import os
 import re
+import signal
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
 from time import perf_counter
 from typing import Any, NamedTuple, Self, TypeVar
 
@@ -66,15 +69,17 @@ class Workers:
         self._carried: Any = None
         local: Any = distributed.LocalCluster
         make: Any = distributed.Client
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is told in one line of an error
         try:
             if not scheduler:
-                self._cluster = local(
-                    n_workers=count or os.cpu_count() or 1, threads_per_worker=1, processes=True,
-                    dashboard_address=None, host="127.0.0.1", env=ONE_THREAD, silence_logs=logging.CRITICAL,
-                )  # fmt: skip
+                with _deaf():
+                    self._cluster = local(
+                        n_workers=count or os.cpu_count() or 1, threads_per_worker=1, processes=True,
+                        dashboard_address=None, host="127.0.0.1", env=ONE_THREAD, silence_logs=logging.CRITICAL,
+                    )  # fmt: skip
             self._client = make(self._cluster or scheduler, timeout=min(patience, ANSWERS), set_as_default=False)
             self._client.wait_for_workers(1, timeout=patience)
-        except (OSError, TimeoutError) as error:
+        except (OSError, RuntimeError) as error:  # a timeout is an OSError
             where = f"--scheduler {scheduler}" if scheduler else "the workers of this machine"
             self.close()
             raise WorkersLost(f"{where}: nobody answers: {error or 'no worker'}") from None
@@ -118,8 +123,14 @@ class Workers:
                 f"a piece of the work was given to several workers, and each was lost with it ({error}). Memory, "
                 "perhaps: look at their output, and take fewer workers"
             ) from None
+        except (OSError, CancelledError):
+            waiting.clear()
+            raise WorkersLost(
+                "the scheduler answers no more: what it was given is lost. See that it runs, and begin again"
+            ) from None
         finally:
-            self._client.cancel(waiting)
+            if waiting:
+                self._client.cancel(waiting)
 
     def run(self, task: Task, jobs: Sequence[Job]) -> Iterable[Lost]:
         """A `detent.tuner.judge.Runner`."""
@@ -136,6 +147,26 @@ class Workers:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that are started here, or later by threads that were, do not hear Ctrl-C.
+
+    A terminal sends it to all of them. They have nothing to tidy up; whoever has started them asks them to end, or is
+    gone, and then they end by themselves. Where no signals can be held back (not POSIX) they hear it.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    from multiprocessing import resource_tracker  # POSIX
+
+    resource_tracker.ensure_running()  # else it is begun in there, and hears Ctrl-C, and lets others hear it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _timed(do: Callable[[Any, list[Any]], list[Any]], shared: Any, pieces: list[Any]) -> _Done:

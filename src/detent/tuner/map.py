@@ -7,9 +7,9 @@ import numpy as np
 from detent.motors.rotor import Floats
 from detent.tuner.grid import logarithmic
 from detent.tuner.judge import Job, Runner, judge_of, one_by_one
-from detent.tuner.search import Cancelled, Progress, Watch, never, nobody
+from detent.tuner.search import Cancelled, Progress, Stopped, Watch, never, nobody
 from detent.tuner.spaces import Point
-from detent.tuner.task import Task, TunerError
+from detent.tuner.task import Task
 
 COLUMNS, ROWS, VARIANTS = 22, 20, 32
 TOGETHER = 8  # points given to the runner at once
@@ -49,7 +49,7 @@ def loss_map(
 ) -> Map:  # fmt: skip
     """The map about a point. Draws 0 to `variants` of the task judge each of its points.
 
-    `together` points are given to `run` at once. TunerError if it was stopped: half a map says nothing.
+    `together` points are given to `run` at once. Stopped if it was: half a map says nothing.
     """
     judge = judge_of(task)
     space = judge.space
@@ -77,6 +77,6 @@ def loss_map(
         for (place, _), losers in zip(some, run(task, [job for _, job in some]), strict=True):
             lost[place] = len(losers) / variants
         if cancelled():
-            raise TunerError("the map was stopped before it was whole, and is not written")
+            raise Stopped("the map was stopped before it was whole")
         watch(Progress(k + len(some), len(jobs), None, "map"))
     return Map(space.plane, space.labels, x, y, lost, times, variants, (point[x_at], point[y_at]), point)

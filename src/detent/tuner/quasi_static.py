@@ -22,7 +22,10 @@ STARTED = 25  # full steps that a start must hold
 
 
 class Torque(NamedTuple):
-    """Torque of a rig over speed: speeds rise; `available` is pull-out, `steady` friction and load."""
+    """Torque of a rig over speed: speeds rise; `available` is pull-out, `steady` friction, and load as at the start.
+
+    `less` and `more` (both 0 or above) is by how much a load that changes ever pulls less and more than at the start.
+    """
 
     speeds: Floats  # steps/s
     available: Floats  # Nm
@@ -30,6 +33,8 @@ class Torque(NamedTuple):
     inertia: float  # kg m2, all of it
     radians: float  # of the shaft, a step
     holding: float  # Nm at the drive's current
+    less: float = 0.0  # Nm
+    more: float = 0.0  # Nm
 
     def speed_at(self, torque: float) -> float:
         """The highest speed at which so much is available; the lowest of the curve if it is nowhere."""
@@ -56,9 +61,22 @@ class Torque(NamedTuple):
 
     @property
     def top(self) -> float:
-        """The speed at which nothing is left to accelerate."""
+        """The last speed of the curve at which something is left to accelerate, the load as at the start."""
         left = np.flatnonzero(self.available > self.steady)
         return float(self.speeds[left[-1]]) if len(left) else 0.0
+
+    @property
+    def highest(self) -> float:
+        """The speed at which nothing is left, the load at its least."""
+        left = self.available - self.steady + self.less
+        some = np.flatnonzero(left > 0)
+        if not len(some):
+            return 0.0
+        at = int(some[-1])
+        if at + 1 == len(left):
+            return float(self.speeds[-1])
+        part = left[at] / (left[at] - left[at + 1])
+        return float(self.speeds[at] + part * (self.speeds[at + 1] - self.speeds[at]))
 
 
 def torque_of(rig: Rig, way: int = 1) -> Torque:
@@ -74,10 +92,11 @@ def torque_of(rig: Rig, way: int = 1) -> Torque:
         available.append(pull_out(motor, rig.drive, rate).torque)
         rate *= RATIO
     at = np.array(speeds)
-    steady = load.friction + load.viscous * at * radians + way * (load.torque if load.is_steady else load.at_rest())
+    steady = load.friction + load.viscous * at * radians + way * load.at_rest()
     torque = motor.torque_constant * 2**0.5 * rig.drive.current
+    ends = sorted(way * end - way * load.at_rest() for end in load.ends())
     return Torque(at, np.array(available), np.broadcast_to(steady, at.shape).astype(np.float64),
-                  motor.rotor + load.inertia, radians, torque)  # fmt: skip
+                  motor.rotor + load.inertia, radians, torque, max(-ends[0], 0.0), max(ends[1], 0.0))  # fmt: skip
 
 
 class Bound(NamedTuple):
@@ -121,15 +140,19 @@ def _slowest(rigs: Sequence[Rig], distances: Sequence[int], both_ways: bool) -> 
 
 
 def fastest(torque: Torque, distances: Sequence[int]) -> tuple[float, ...]:
-    """Seconds for each distance (steps): up with all torque, on at the top, down with torque and friction."""
-    top = torque.top
+    """Seconds for each distance (steps): up with all torque, on at the top, down with torque and friction.
+
+    No rotor without lag is faster, wherever a load that changes pulls how much: it goes up as where it pulls least,
+    and down as where it pulls most.
+    """
+    top = torque.highest
     if top <= 0:
         return tuple(float("inf") for _ in distances)
     speeds = np.linspace(0, top, FINE_POINTS)
     available = np.interp(speeds, torque.speeds, torque.available)
     steady = np.interp(speeds, torque.speeds, torque.steady)
-    up = torque.acceleration(1.0) * (available - steady)
-    down = torque.acceleration(1.0) * (available + steady)
+    up = torque.acceleration(1.0) * (available - steady + torque.less)
+    down = torque.acceleration(1.0) * (available + steady + torque.more)
     usable = up > 1e-3 * up.max()
     speeds, up, down = speeds[usable], up[usable], np.maximum(down[usable], 1e-9)
     if len(speeds) < 2:

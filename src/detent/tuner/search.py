@@ -61,7 +61,8 @@ class Check(NamedTuple):
     def __str__(self) -> str:
         corners = f" and of {self.corners} corners" if self.corners else ""
         if not self.variants:
-            return f"survives {self.met} variants{corners}, among them all that other settings lost; no fresh ones yet"
+            every = f"all {self.corners} corners and " if self.corners else ""
+            return f"survives {self.met} variants, among them {every}all that other settings lost; no fresh ones yet"
         if self.lost == self.corners_lost:
             what = f"{self.lost} of {self.variants}{corners} lost"
         else:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from detent.controllers import catalogue
 from detent.controllers.genstepper.commands import Op
+from detent.motors.rotor import Rig
 from detent.motors.winding import Winding
 from detent.moves.law import Law, Setting, Values
 from detent.moves.laws import law
@@ -95,12 +96,29 @@ def space(task: Task) -> Space:
     torques = [torque_of(rig, way) for way in ((1, -1) if task.both_ways else (1,))]
     torque = min(torques, key=lambda one: one.top)
     if torque.top <= 0:
-        raise TunerError(
-            f"{rig.motor.name} with {rig.drive.supply:g} V and {rig.drive.current:g} A does not turn this load at any "
-            f"speed: friction and load take {torque.steady_at(0):.3g} of {torque.available_at(0):.3g} Nm"
-        )
+        raise TunerError(_too_heavy(rig, torque))
     hand = rule_of_thumb(rig, torque)
     return _MAKE[catalogue.model(task.model).name](task, torque, hand)
+
+
+def _too_heavy(rig: Rig, torque: Torque) -> str:
+    takes, has = torque.steady_at(0), torque.available_at(0)
+    words = (
+        f"{rig.motor.name} with {rig.drive.supply:g} V and {rig.drive.current:g} A does not turn this load at any speed"
+    )
+    if has <= 0:
+        return f"{words}: its own friction takes all of its torque; check the motor's data"
+    load = rig.load
+    of_it = [
+        f"{name} {part:.3g}" for name, part in (("friction", load.friction), ("pull", abs(load.at_rest()))) if part
+    ]
+    parts = f" ({', '.join(of_it)})" if len(of_it) > 1 else ""
+    factor = takes / has
+    gear = f", a gear of {1.5 * factor:.2g} or more" if factor < 1000 else ""
+    return (
+        f"{words}: to move it takes {takes:.3g} Nm{parts}, {factor:.3g} times the {has:.3g} Nm that the motor has at "
+        f"slow speed; less friction or load{gear}, or another motor (or is a number in the wrong unit?)"
+    )
 
 
 class _Speeds(NamedTuple):

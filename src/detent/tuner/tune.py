@@ -12,7 +12,7 @@ from detent.motors.variants import QUANTITIES, Ensemble
 from detent.motors.winding import HALF, HALF_COMPENSATED
 from detent.tuner.judge import Job, Judge, Runner, judge_of, one_by_one, weighed
 from detent.tuner.quasi_static import Bound, bound
-from detent.tuner.search import AHEAD, Cancelled, Check, Found, Progress, Watch, never, nobody, search
+from detent.tuner.search import AHEAD, Cancelled, Check, Found, Progress, Stopped, Watch, never, nobody, search
 from detent.tuner.spaces import Point, Profile
 from detent.tuner.task import Task
 
@@ -49,7 +49,7 @@ class Failure(NamedTuple):
 
 
 class Tuned(NamedTuple):
-    """What was found for a task. A search that was stopped has neither `models` nor `fails`."""
+    """What was found for a task. Where it was stopped, what comes behind the search may be missing."""
 
     task: Task
     found: Found
@@ -81,21 +81,32 @@ def tune(
     """
     found = search(task, run=run, ahead=ahead, watch=watch, cancelled=cancelled)
     limits = bound(task.rig, task.spread, [move.steps for move in task.moves], both_ways=task.both_ways)
-    if not found.whole:
-        return Tuned(task, found, limits, None, None, (), ())
     judge = judge_of(task)
+    if cancelled():
+        return Tuned(task, found, limits, None, None, (), ())
     watch(Progress(found.tested, found.tested, found.time, "comparing"))
     hand = rival(judge, judge.space.hand)
-    return Tuned(task, found, limits, hand, _safe(judge, found, hand), models(judge, found.point),
-                 fails(judge, found.point))  # fmt: skip
+    safe = _safe(judge, found, hand)
+    others = () if cancelled() else models(judge, found.point)
+    first = () if cancelled() else fails(judge, found.point)
+    return Tuned(task, found, limits, hand, safe, others, first)
 
 
 def each_move(
     task: Task, *, run: Runner = one_by_one, ahead: int = AHEAD, watch: Watch = nobody, cancelled: Cancelled = never
 ) -> list[Tuned]:
-    """Settings for each move alone, to be sent before it."""
-    parts = [replace(task, moves=(move,)) for move in task.moves]
-    return [tune(part, run=run, ahead=ahead, watch=watch, cancelled=cancelled) for part in parts]
+    """Settings for each move alone, to be sent before it; those of the first moves where it was stopped."""
+    found: list[Tuned] = []
+    for move in task.moves:
+        if found and cancelled():
+            break
+        try:
+            part = replace(task, moves=(move,))
+            found.append(tune(part, run=run, ahead=ahead, watch=watch, cancelled=cancelled))
+        except Stopped:
+            if not found:
+                raise
+    return found
 
 
 def rival(judge: Judge, point: Point, tried: int = MODEL_VARIANTS) -> Rival | None:

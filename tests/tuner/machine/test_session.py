@@ -13,7 +13,7 @@ from detent.motors.load import Load
 from detent.motors.move import simulate
 from detent.motors.rotor import Rig
 from detent.tuner.machine.carriage import MachineError, Room
-from detent.tuner.machine.session import Plan, Result
+from detent.tuner.machine.session import Plan, Result, left_safe
 
 SHORT = Room(travel=220, behind=40, turn=8, rate=400)
 SAFE = ("S=60", "T=400", "R=40")
@@ -90,6 +90,26 @@ class TestLog:
         assert here == there
         assert again.trials()[0]["number"] == 4
         assert [dict(one) for one in [*bed.trials(), *again.trials()]] == [dict(one) for one in first.trials()]
+
+    def test_whoever_interrupts_a_trial_finds_the_settings_with_which_it_began(self) -> None:
+        """In the middle of the fast move of trial 3: R is shorter then, and in between S and T are those of the way."""
+        bed = gsc200s()
+        wait = bed.port.wait
+
+        def interrupted(seconds: float) -> None:
+            wait(seconds)
+            if bed.motor().place(bed.cell.now) > 60:
+                bed.port.wait = wait  # type: ignore[method-assign]
+                raise KeyboardInterrupt
+
+        bed.on[3] = lambda: setattr(bed.port, "wait", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            bed.run(short(bed))
+        registers = bed.cell.controller("axis").registers
+        assert registers(bed.cell.now)["R"] != "40"
+        bed.shell.perform(left_safe(short(bed), bed.bench))
+        assert not bed.shell.perform(bed.bench.driver.moving())
+        assert [registers(bed.cell.now)[name] for name in "STR"] == ["60", "400", "40"]
 
     def test_a_finished_log_moves_nothing(self, whole: Whole) -> None:
         bed, found = whole

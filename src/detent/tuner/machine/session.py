@@ -152,6 +152,15 @@ def run(plan: Plan, bench: Bench, record: Callable[[Record], object], past: Iter
     return result
 
 
+def left_safe(plan: Plan, bench: Bench) -> Steps[None]:
+    """After a run that did not come to its end: stand, and have the settings with which it began.
+
+    Those of a trial may be too hard for a longer move, and those of the way back are as slow as it was.
+    """
+    yield from bench.end()
+    yield from bench.settings(plan.begin)
+
+
 def _tried(
     carriage: Carriage, plan: Plan, trial: Trial, values: Values, record: Callable[[Record], object]
 ) -> Steps[int]:
