@@ -94,6 +94,8 @@ def compare_moves(
         print(json_text.dumps({**about, "settings": facts}))
         return
     _print(task, rows)
+    if task.both_ways:
+        print("\njudged in both directions, as the load pulls", end="")
     print("\nassumed: " + "; ".join(found.words))
     if plot is not None:
         print(f"Wrote {plot}")

@@ -310,7 +310,7 @@ class _Move(NamedTuple):
             from detent.moves.spelling import spelled
 
             train = law.law.train(law.values, steps)
-            return cls(found, rig, train, steps, f"as {law.law.model} {spelled(law.law, law.values)}")
+            return cls(found, rig, train, steps, f"as {law.law.model} {spelled(law.law, law.values)}{_way(rig)}")
         top = _rate("--slew", SLEW if slew is None else slew)
         first = _default_start(rig, top) if start is None else _rate("--start", start)
         if first > top:
@@ -319,7 +319,13 @@ class _Move(NamedTuple):
         words = f"{first} to {top} steps/s in ramps of {long}"
         if start is None:
             words += f" (start chosen away from the resonance at {_resonance(rig):.0f} steps/s)"
-        return cls(found, rig, ramped(first, top, long, steps).train, steps, words)
+        return cls(found, rig, ramped(first, top, long, steps).train, steps, words + _way(rig))
+
+
+def _way(rig: "Rig") -> str:
+    """A move goes plus; where the load pulls to one side, that makes a difference."""
+    pull = rig.load.at_rest()
+    return "" if not pull else f", {'against' if pull > 0 else 'with'} the load"
 
 
 def _whole(option: str, value: float, most: int) -> int:

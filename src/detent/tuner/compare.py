@@ -9,6 +9,7 @@ from detent.motors.rotor import Floats
 from detent.motors.variants import Ensemble
 from detent.moves.law import Law, Values
 from detent.pulses import Train
+from detent.tuner.judge import ways_of
 from detent.tuner.quasi_static import Torque, torque_of
 from detent.tuner.search import Check
 from detent.tuner.task import Task
@@ -33,7 +34,10 @@ class Compared(NamedTuple):
 
 
 def compare(task: Task, settings: Sequence[tuple[str, Law, Values]]) -> list[Compared]:
-    """Settings with their names, in the order given. The same draws, and all corners, judge each of them."""
+    """Settings with their names, in the order given. The same draws, and all corners, judge each of them.
+
+    There and back, where the load pulls to one side.
+    """
     torque = torque_of(task.rig)
     rig = task.rig_with(task.rig.drive.winding, fine=True)
     corners = Ensemble(rig, task.factors(task.corners)) if task.corners else None
@@ -43,10 +47,10 @@ def compare(task: Task, settings: Sequence[tuple[str, Law, Values]]) -> list[Com
         trains = [law.train(values, move.steps) for move in task.moves]
         lost = np.zeros(len(drawn), bool)
         corners_lost = np.zeros(0 if corners is None else len(corners), bool)
-        for train in trains:
-            lost |= drawn.judge(train).lost
+        for pulses in (way for train in trains for way in ways_of(task, train)):
+            lost |= drawn.judge(pulses).lost
             if corners is not None:
-                corners_lost |= corners.judge(train).lost
+                corners_lost |= corners.judge(pulses).lost
         check = Check(len(lost), int(lost.sum()), len(corners_lost), int(corners_lost.sum()), 1, 0)
         longest = max(trains, key=lambda train: train.steps or 0)
         at, speeds, used = torque_used(longest, torque)

@@ -81,8 +81,8 @@ class Judge:
         return None if times is None else weighed(self.task, times)
 
     def ways(self, train: Train) -> list[Pulses]:
-        """The move as it is judged: there, and back where the load pulls to one side."""
-        return [train, [Part(train, -1)]] if self.task.both_ways else [train]
+        """See `ways_of`."""
+        return ways_of(self.task, train)
 
     def answer(self, job: Job) -> Lost:
         """The variants of the job that lose a step."""
@@ -104,6 +104,11 @@ class Judge:
                 if (at := some.survives(pulses)) is not None:
                     return (job.variants[(part.start or 0) + at],)
         return ()
+
+
+def ways_of(task: Task, train: Train) -> list[Pulses]:
+    """The move as it is judged: there, and back where the load pulls to one side."""
+    return [train, [Part(train, -1)]] if task.both_ways else [train]
 
 
 def weighed(task: Task, times: Sequence[float]) -> float:
