@@ -13,6 +13,8 @@ import pytest
 
 from detent.cli import main
 from detent.cli import tune as verb
+from detent.tuner import tune as tuning
+from detent.tuner.judge import Job, Judge, Lost
 from detent.tuner.search import Progress
 
 RIG = ["--motor", "qsh4218-41-10-035", "--inertia", "1.5e-5", "--friction", "0.02"]
@@ -139,6 +141,19 @@ SMALL = ["--variants", "64", "--no-corners", "--no-gpu"]
 
 
 @pytest.fixture
+def planted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No motor is asked: what has a ramp below 60 is lost."""
+
+    def answer(_: Judge, job: Job) -> Lost:
+        lost = job.variants if job.point[2] < 60 else ()
+        return lost if job.to_the_end else lost[:1]
+
+    monkeypatch.setattr(Judge, "answer", answer)
+    monkeypatch.setattr(tuning, "models", lambda *_: ())
+    monkeypatch.setattr(tuning, "fails", lambda *_: ())
+
+
+@pytest.fixture
 def ctrl_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     """Presses Ctrl-C, for real, when the work says that it is at a stage (how what it does begins)."""
 
@@ -161,12 +176,13 @@ def ctrl_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 @pytest.mark.parametrize(
     ("stage", "proved"),
     [
-        pytest.param("looking", False, marks=pytest.mark.slow),
-        pytest.param("at ", False, marks=pytest.mark.slow),
-        pytest.param("comparing", True, marks=pytest.mark.slow),
+        ("looking", False),
+        ("at ", False),
+        ("comparing", True),
         ("map", True),
     ],
 )
+@pytest.mark.usefixtures("planted")
 def test_ctrl_c_loses_nothing_that_is_known(
     stage: str, proved: bool, ctrl_c: Callable[[str], None], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -191,6 +207,7 @@ def test_ctrl_c_loses_nothing_that_is_known(
     assert (str(program) in line) is not proved
 
 
+@pytest.mark.usefixtures("planted")
 def test_ctrl_c_before_anything_is_known_is_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -203,6 +220,7 @@ def test_ctrl_c_before_anything_is_known_is_one_line(
     assert told == "detent: stopped before any setting without loss was known\n"
 
 
+@pytest.mark.usefixtures("planted")
 def test_ctrl_c_between_moves_keeps_what_is_known_of_the_first(
     ctrl_c: Callable[[str], None], capsys: pytest.CaptureFixture[str]
 ) -> None:

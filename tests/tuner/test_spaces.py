@@ -14,9 +14,10 @@ from detent.motors.named import motor
 from detent.motors.rotor import Rig
 from detent.moves.law import winding_of
 from detent.moves.laws import law
+from detent.tuner.grid import points
 from detent.tuner.into import program, put_into
 from detent.tuner.judge import Judge
-from detent.tuner.spaces import Profile
+from detent.tuner.spaces import Profile, space
 from detent.tuner.task import Task, TunerError, moves_of
 
 LOAD = Load(inertia=1.5e-5, friction=0.02)
@@ -151,3 +152,15 @@ def test_settings_of_one_motor_of_a_board_go_into_its_part_of_a_backup() -> None
         "stop_rate = 81\nrun_rate = 801\nslope = 8001",
         f"stop_rate = {values['K']}\nrun_rate = {values['R']}\nslope = {values['P']}",
     )
+
+
+@pytest.mark.parametrize("size", ["1", "4", "64"])
+def test_a_board_whose_slope_is_the_limit_has_settings_all_the_same(size: str) -> None:
+    """A small load could be accelerated more than P at its most does in fine steps."""
+    made = law("bs0610", {"step_size": size})
+    rig = Rig(motor("qsh4218-41-10-035"), Drive(5, 1.0, made.windings[0], "voltage"), Load(5.4e-6, friction=0.01))
+    found = space(Task("bs0610", rig, moves_of("800"), {"step_size": size}))
+    profiles = [
+        found.profile(point) for point in points([one.values for one in found.dimensions]) if found.admits(point)
+    ]
+    assert sum(profile is not None for profile in profiles) >= 20

@@ -322,7 +322,7 @@ class _Search:
     def why_none(self) -> str:
         words = "no settings on the grid make these moves without losing a step in some variant"
         if self.last_lost is None:
-            return words
+            return "there are no settings within what these commands take"
         from detent.motors.diagnosis import diagnose
         from detent.motors.variants import QUANTITIES, changed
 

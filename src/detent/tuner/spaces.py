@@ -218,8 +218,11 @@ def _genstepper(task: Task, torque: Torque, hand: RuleOfThumb) -> Space:
     # the dimensions are in full steps, thousandths of them for a start: so that they are the same for every size
     full = task.rig.drive.winding.steps
 
+    limit = most * max(sizes) / 64  # of the coarsest step that may be chosen
+
     def scaled(ends: tuple[float, float], least: float) -> tuple[float, float]:
-        return max(ends[0] / full, least), max(min(ends[1] / full, most / min(sizes)), 2 * least)
+        high = min(max(ends[1] / full, 2 * least), limit)
+        return min(max(ends[0] / full, least), limit / 4), high
 
     start, slew, slope = scaled(speeds.start, 1.0), scaled(speeds.slew, 2.0), scaled(speeds.acceleration, 2.0)
     dimensions = (
