@@ -16,6 +16,8 @@ from detent.cli import tune as verb
 from detent.tuner import tune as tuning
 from detent.tuner.judge import Job, Judge, Lost
 from detent.tuner.search import Progress
+from detent.tuner.spaces import Space, space
+from detent.tuner.task import Task
 
 RIG = ["--motor", "qsh4218-41-10-035", "--inertia", "1.5e-5", "--friction", "0.02"]
 
@@ -142,12 +144,20 @@ SMALL = ["--variants", "64", "--no-corners", "--no-gpu"]
 
 @pytest.fixture
 def planted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No motor is asked: what has a ramp below 60 is lost."""
+    """A few settings, of which no motor is asked: what has a ramp below 60 is lost."""
+
+    def few(task: Task) -> Space:
+        made = space(task)
+        values = ((40, 90), (200, 400, 600), (20, 40, 80, 160))
+        return made._replace(
+            dimensions=tuple(one._replace(values=some) for one, some in zip(made.dimensions, values, strict=True))
+        )
 
     def answer(_: Judge, job: Job) -> Lost:
         lost = job.variants if job.point[2] < 60 else ()
         return lost if job.to_the_end else lost[:1]
 
+    monkeypatch.setattr("detent.tuner.judge.space", few)
     monkeypatch.setattr(Judge, "answer", answer)
     monkeypatch.setattr(tuning, "models", lambda *_: ())
     monkeypatch.setattr(tuning, "fails", lambda *_: ())
