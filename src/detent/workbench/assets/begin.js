@@ -4,6 +4,8 @@ import { worded } from "./elements.js";
 
 const { part, call, toast, remembered, remember } = window.detent;
 
+const AGAIN = 2000; // ms
+
 part("begin", (box) => {
   /** @param {string} name */
   const role = (name) => box.querySelector(`[data-role="${name}"]`);
@@ -373,12 +375,17 @@ part("begin", (box) => {
   role("model").addEventListener("change", commands);
   role("search").addEventListener("input", search);
 
-  Promise.all([call("jacks"), call("fittings")]).then(([told, more]) => {
+  /** What a new cell is made of: asked for again until there is a connection, however slow it is in coming. */
+  const load = () => Promise.all([call("jacks"), call("fittings")]).then(([told, more]) => {
     jacks = told;
     fittings = more;
     role("unit-model").replaceChildren(...Object.keys(jacks).map((name) => new Option(name, name)));
     draw();
-  }).catch((error) => toast(error.message, "error"));
+  }).catch((error) => {
+    toast(error.message, "error");
+    if (box.isConnected) setTimeout(load, AGAIN);
+  });
+  load();
   places();
   commands();
 });
