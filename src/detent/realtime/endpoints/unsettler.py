@@ -47,7 +47,7 @@ def unsettle(descriptor: int, last: int) -> int:
 def come_first() -> None:
     """Have the scheduler give this process its turns soon: by priority where it may, or else because they are short.
 
-    It wants some 20 us whenever a client has set something, and nothing in between.
+    It has little to do whenever a client has set something, and nothing in between.
     """
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
