@@ -50,10 +50,18 @@ class MotionEnded(NamedTuple):
     axis: str = ""
 
 
+class Displaced(NamedTuple):
+    """The shaft, at rest, was found at `shaft`, and not where its pulses had commanded it to."""
+
+    at: Ns
+    shaft: int
+    axis: str = ""
+
+
 class Outbox(Protocol):
     """Where an axis tells what it does: the owner's list of outputs."""
 
-    def append(self, item: MotionStarted | MotionCut | MotionEnded, /) -> None:
+    def append(self, item: MotionStarted | MotionCut | MotionEnded | Displaced, /) -> None:
         """Take the next output."""
 
 
@@ -144,11 +152,12 @@ class Axis:
             self._out.append(MotionCut(now, given, self.name))
         self._rest(given)
 
-    def displace(self, by: int) -> None:
+    def displace(self, by: int, now: Ns) -> None:
         """The shaft, at rest, is found `by` steps from where it was commanded to. RuntimeError while it moves."""
         if self.train is not None:
             raise RuntimeError("the axis is moving: `cut` it first")
         self.shaft += by
+        self._out.append(Displaced(now, self.shaft, self.name))
 
     def gate(self, is_open: bool, now: Ns) -> None:
         """Shut or open the gate. A pulse that falls due while it is shut is held, and given when it opens.

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from tests.workbench.told import Told, example
+from tests.workbench.told import Told, alone, example
 
 from detent.outputs import signals
 from detent.outputs.waves import UNKNOWN
@@ -127,6 +127,26 @@ def test_what_is_forgotten_leaves_levels_and_places_as_they_were() -> None:
     assert told.mirror.signals().unit(told.picture.units[next(iter(told.picture.units))].name).motion.position(
         12 * SECOND
     ) == whole.mirror.signals().unit(next(iter(whole.picture.units))).motion.position(12 * SECOND)
+
+
+def test_an_axis_that_was_found_elsewhere_is_shown_there_at_once() -> None:
+    """As behind real pins when a board that was stopped has counted fewer steps than the cell had given."""
+    told = alone("gs-c200s", CHS=0)
+    told.cell.type("gs-c200s", "+50")
+    told.run(2 * SECOND, 20 * MS)
+    told.cell.displace("gs-c200s", "", -7)
+    told.run(3 * SECOND, 20 * MS)
+    data = told.scope.columns(["gs-c200s.position", "gs-c200s.pulses"], 0, 3 * SECOND, 300, 0)
+    last = int((2900 * MS) // data.width)
+    assert (data.low[0, last], data.high[0, last], data.high[1, last]) == (43, 43, 50)
+    before = int((1900 * MS) // data.width)
+    assert data.low[0, before] == 50
+    [front] = told.history.panel.fronts
+    assert front.travels[""].at(told.cell.now) == (43, 0.0)
+    told.cell.type("gs-c200s", "+10")
+    told.run(4 * SECOND, 20 * MS)
+    data = told.scope.columns(["gs-c200s.position"], 0, 4 * SECOND, 300, 0)
+    assert data.high[0, int((3900 * MS) // data.width)] == 53
 
 
 def test_triggers_are_found_at_their_very_nanosecond(drilling: Told) -> None:

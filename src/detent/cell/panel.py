@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from typing import Self
 
-from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.axis import Displaced, MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
 from detent.cell.recording import Batch, Entry, InputSet
 from detent.controllers.device import Cautioned, Device, Executing, Finished, Powered, Refused, StoreImage
@@ -77,6 +77,8 @@ class Front:
                 self.travels[entry.axis].motion = entry
             case MotionCut() | MotionEnded():
                 self.travels[entry.axis].end(entry.last)
+            case Displaced(_, shaft, axis):
+                self.travels[axis].shaft = shaft
             case Executing():
                 self.executing = entry
                 return True

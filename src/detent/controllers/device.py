@@ -15,7 +15,7 @@ changes (tables, trains, options) returns itself when copied.
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
-from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.axis import Displaced, MotionCut, MotionEnded, MotionStarted
 from detent.pins import Level, Pin, PinSet, PulseOutput
 from detent.pulses.segment import Int64Array
 from detent.ticks import Ns
@@ -132,7 +132,7 @@ class DriveSet(NamedTuple):
 
 
 Output: TypeAlias = (
-    Sent | PinSet | MotionStarted | MotionCut | MotionEnded | DriveSet | StageSet
+    Sent | PinSet | MotionStarted | MotionCut | MotionEnded | Displaced | DriveSet | StageSet
     | Executing | Finished | Refused | Cautioned | StoreImage | Powered
 )  # fmt: skip
 

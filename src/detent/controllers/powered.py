@@ -111,7 +111,7 @@ class OneAxis(PoweredDevice):
     def displace(self, by: int, now: Ns, axis: str = "") -> None:
         """The shaft is elsewhere. RuntimeError while it moves."""
         self.advance(now)
-        self._axis.displace(by)
+        self._axis.displace(by, now)
 
     def _cut(self, now: Ns) -> None:
         """No further pulse."""

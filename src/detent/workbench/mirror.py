@@ -7,9 +7,9 @@ level of each pin, the last motion of each axis, drives and supplies.
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping
 from math import nan
-from typing import Final
+from typing import Final, TypeAlias
 
-from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.axis import Displaced, MotionCut, MotionEnded, MotionStarted
 from detent.cell.actions import Load, TimedAction
 from detent.cell.moments import Cut
 from detent.cell.recording import Batch, Entry, InputSet, Received, Recording, Span
@@ -18,6 +18,7 @@ from detent.outputs.signals import Signals
 from detent.outputs.units import UnitView
 from detent.outputs.waves import Spoken, serial_wave
 from detent.pins import HIGH, Level, PinKind, PinSet
+from detent.pulses import Train
 from detent.ticks import Ns
 from detent.uart import Sent
 from detent.workbench import rotors
@@ -28,7 +29,8 @@ MOST_ROWS: Final = 1_000_000  # of a rotor: most of a minute of motion
 MOST_ACTIONS: Final = 200_000  # with more, they cannot be done again
 SLACK: Final = 4  # what is no longer needed is forgotten when it is so many-th of everything
 
-_MOTION = (MotionStarted, MotionCut, MotionEnded)
+STILL = Train(())  # of an axis that was found elsewhere, without a pulse
+Told: TypeAlias = MotionStarted | MotionCut | MotionEnded | Displaced
 
 
 class Axis:
@@ -39,15 +41,18 @@ class Axis:
         self.pulses = 0  # given before the first motion
         self.spans: list[Span] = []  # that are over
         self.motion: MotionStarted | None = None  # under way
-        self._told: list[tuple[int, MotionStarted | MotionCut | MotionEnded]] = []
+        self._told: list[tuple[int, Told]] = []
         self._counts = [0]  # pulses of the first so many spans
 
-    def take(self, batch: int, entry: MotionStarted | MotionCut | MotionEnded) -> None:
+    def take(self, batch: int, entry: Told) -> None:
         """The axis does this."""
         self._told.append((batch, entry))
         if isinstance(entry, MotionStarted):
             self._end(entry.at, entry.first - 1)
             self.motion = entry
+        elif isinstance(entry, Displaced):
+            self.spans.append(Span(entry.at, entry.at, STILL, 1, 0, 1, entry.shaft))
+            self._counts.append(self._counts[-1])
         else:
             self._end(entry.at, entry.last)
 
@@ -92,7 +97,7 @@ class Axis:
                 self.initial, self.pulses = self.before(self.spans[-1].ends + 1)
             self._again(kept)
 
-    def _again(self, told: list[tuple[int, MotionStarted | MotionCut | MotionEnded]]) -> None:
+    def _again(self, told: list[tuple[int, Told]]) -> None:
         self.spans, self.motion, self._told, self._counts = [], None, [], [0]
         for batch, entry in told:
             self.take(batch, entry)
@@ -140,7 +145,7 @@ class Unit:
                     self._change(pin, at, level, batch)
             case Sent() | Received():
                 self._hear(batch, entry)
-            case MotionStarted() | MotionCut() | MotionEnded():
+            case MotionStarted() | MotionCut() | MotionEnded() | Displaced():
                 self.axes[entry.axis].take(batch, entry)
             case Powered(at, on):
                 self._put_bits()

@@ -223,7 +223,7 @@ class Board(PoweredDevice):
     def displace(self, by: int, now: Ns, axis: str = "") -> None:
         """The shaft of a motor is elsewhere."""
         self.advance(now)
-        self._motors[axis or AXES[0]].displace(by)
+        self._motors[axis or AXES[0]].displace(by, now)
         self._settle(now)
 
     def duties(self, connector: str, now: Ns) -> Duties:

@@ -195,9 +195,9 @@ class Motor:
             self._axis.cut(now)
         self._rest()
 
-    def displace(self, by: int) -> None:
+    def displace(self, by: int, now: Ns) -> None:
         """The shaft, at rest, is `by` microsteps from where it was thought to be. The field stays as it is."""
-        self._axis.displace(by)
+        self._axis.displace(by, now)
         self._field += by
 
     def look_at_limit(self, now: Ns) -> None:
