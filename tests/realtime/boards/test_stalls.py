@@ -75,3 +75,8 @@ def session(seed: int, *, writes: bool) -> int:
 @pytest.mark.parametrize("part", range(3))
 def test_a_stall_at_any_look_at_the_clock_is_a_slip(part: int) -> None:
     assert sum(session(seed, writes=False) for seed in range(10 * part, 10 * part + 10)) > 3
+
+
+@pytest.mark.slow
+def test_a_stall_anywhere_is_a_slip_in_many_sessions() -> None:
+    assert sum(session(seed, writes=False) for seed in range(100, 700)) > 800

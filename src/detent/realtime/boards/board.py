@@ -373,8 +373,7 @@ class Board:
         wanted = out.setup.off if self._recovering else out.setup.initial
         out.began(wall, out.setup.off if self._was_down else not wanted)
         if out.level is not wanted:
-            out.now(wanted)
-            out.commit(wall)
+            out.now(wanted)  # with the next commit, which looks whether it is late
 
     # -- what goes wrong
 
