@@ -62,8 +62,15 @@ class Step(NamedTuple):
     def frequency(self) -> float:
         """Hz of its swing; 0 if it makes none."""
         off = self.places - 1.0
-        up = np.flatnonzero((off[:-1] < 0) & (off[1:] >= 0))
+        swings = np.flatnonzero(np.abs(off) > BAND)  # what is smaller may be noise
+        above = off[swings] > 0
+        up = swings[1:][above[1:] & ~above[:-1]]
         return float((len(up) - 1) / (self.times[up[-1]] - self.times[up[0]])) if len(up) > 1 else 0.0
+
+    @property
+    def half(self) -> float:
+        """S, until it has first made half of the step."""
+        return float(self.times[int(np.argmax(self.places >= 0.5))])
 
 
 def step(rig: Rig, ratio: float, lasts: float = 0.2) -> Step:
@@ -116,8 +123,8 @@ def from_overshoot(rig: Rig, overshoot: float, settling: float | None = None) ->
 def from_record(rig: Rig, times: Sequence[float], places: Sequence[float]) -> RingDown:
     """The damping whose step comes nearest to a record: s since the pulse, and places in any unit, the step whole.
 
-    The first place is where the rotor stood, the last where it comes to rest. MotorError for what is no record of a
-    step.
+    The first place is where the rotor stood, the last where it comes to rest. A record that began well before the step
+    is taken from there. MotorError for what is no record of a step.
     """
     t, x = np.asarray(times, np.float64), np.asarray(places, np.float64)
     if t.ndim != 1 or t.shape != x.shape or len(t) < 8 or not (np.isfinite(t).all() and np.isfinite(x).all()):
@@ -128,6 +135,11 @@ def from_record(rig: Rig, times: Sequence[float], places: Sequence[float]) -> Ri
     if abs(rest - x[0]) < 1e-12:
         raise MotorError("a record of a ring-down: the rotor ends where it began; begin with it before the step")
     t, x = t - t[0], (x - x[0]) / (rest - x[0])
+    expected = step(rig, 0.1).half
+    early = Step(t, x).half - expected
+    if early > expected:  # it began before the pulse
+        stood = float(x[t < early].mean())
+        t, x = t[t >= early] - early, (x[t >= early] - stood) / (1 - stood)
     best = best_of([0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8, 1.2], _off(rig, t, x))
     made, measured = step(rig, best, float(t[-1])), Step(t, x)
     rms = _off(rig, t, x)(best)
