@@ -36,10 +36,11 @@ def test_a_record_may_begin_before_the_step(early: float) -> None:
     assert not found.words
 
 
-def test_noise_is_no_swing() -> None:
+@pytest.mark.parametrize("much", [0.01, 0.03])
+def test_noise_is_no_swing(much: float) -> None:
     times, places = record()
-    noise = 0.02 * np.sin(np.arange(len(times)) * 2.9)
-    assert Step(times, places + noise).frequency == pytest.approx(Step(times, places).frequency, rel=0.03)
+    noise = much * np.random.default_rng(1).standard_normal(len(times))
+    assert Step(times, places + noise).frequency == pytest.approx(Step(times, places).frequency, rel=0.12)
     found = from_record(RIG, list(times), list(places + noise))
-    assert found.damping.ratio == pytest.approx(RATIO, rel=0.25)
+    assert found.damping.ratio == pytest.approx(RATIO, rel=0.3)
     assert not found.words

@@ -62,7 +62,8 @@ class Step(NamedTuple):
     def frequency(self) -> float:
         """Hz of its swing; 0 if it makes none."""
         off = self.places - 1.0
-        swings = np.flatnonzero(np.abs(off) > BAND)  # what is smaller may be noise
+        noise = float(off[-max(len(off) // 10, 1) :].std())
+        swings = np.flatnonzero(np.abs(off) > max(BAND, 4 * noise))  # what is smaller is none
         above = off[swings] > 0
         up = swings[1:][above[1:] & ~above[:-1]]
         return float((len(up) - 1) / (self.times[up[-1]] - self.times[up[0]])) if len(up) > 1 else 0.0
