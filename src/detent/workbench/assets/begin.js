@@ -11,7 +11,8 @@ part("begin", (box) => {
   const role = (name) => box.querySelector(`[data-role="${name}"]`);
   /** @type {Record<string, Record<string, string[]>>} model -> the pins of each side, and its straps */
   let jacks = {};
-  /** @type {{motors: string[], axes: Record<string, string[]>, programs: string[]}} what can be fitted to a model */
+  /** @type {{motors: string[], supplies: Record<string, number>, direct: Record<string, number>, uncontrolled: string[],
+   *   axes: Record<string, string[]>, programs: string[]}} what can be fitted to a model */
   let fittings = { motors: [], supplies: {}, direct: {}, uncontrolled: [], axes: {}, programs: [] };
   /** @type {{title: string, units: any[], wires: {source: string, target: string}[], switches: any[], motors: any[]}} */
   let cell = { title: "", units: [], wires: [], switches: [], motors: [] };
