@@ -1,6 +1,7 @@
 """Units that the workbench talks to: looks, lines, hands, STOP; units that stall, babble, lie, or are unplugged."""
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
@@ -299,6 +300,28 @@ def test_program_and_backup(tmp_path: Path) -> None:
         assert await desk.units.unit_compare(name, "+ 500\nW 0\n") == []
 
     with served("dcb-274", pace=100) as address:
+        at_desk(tmp_path, scene)
+
+
+def test_the_time_of_an_answer_is_not_that_of_others_on_the_line(tmp_path: Path) -> None:
+    """Two addresses at one port: nobody answers at the first, for which the second has to wait."""
+
+    async def scene(desk: Desk) -> None:
+        names = [await desk.units.unit_connect("gs-c200", address, f"patience=2 address={n}") for n in (1, 2)]
+        there = [name for name in names if await desk.until(name, lambda facts: facts["trouble"] or facts["state"])
+                 and not desk.facts(name)["trouble"]]  # fmt: skip
+        assert len(there) == 1
+        begin = time.monotonic()
+        both: Any = await desk.units.unit_both(sorted(names, key=lambda name: name in there), "V1")
+        silent, answered = both
+        assert (silent["ms"], answered["answers"]) == (None, ("V0",))
+        whole = 1000 * (time.monotonic() - begin)
+        assert answered["ms"] <= whole - 2000, "without the two seconds that the other kept the line"
+
+    text = '[units.unit]\nmodel = "gs-c200"\nstraps = { SEL0 = "high", SEL1 = "low", SEL2 = "high" }\n'
+    endpoints = [EndpointSpec("tcp", "127.0.0.1:0")]
+    with Service(parse(text, "cell"), lambda file: "", endpoints) as service, service.in_thread():
+        address = service.endpoints[0].address
         at_desk(tmp_path, scene)
 
 

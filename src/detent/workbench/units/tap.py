@@ -26,10 +26,13 @@ class Tap:
         """Why the port is gone; "" while it is there."""
         self.sent = self.came = 0.0
         """When something was last sent, and when something last came, in seconds by `clock`."""
+        self.began = 0.0
+        """When something was sent first since this was set to 0."""
 
     async def write(self, data: bytes) -> None:
         """Hand over all of `data`. Raises OSError."""
         self._there()
+        self.began = self.began or self.port.clock()
         try:
             await self.port.write(data)
         except OSError as error:

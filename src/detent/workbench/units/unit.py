@@ -201,10 +201,9 @@ class Unit:
 
     async def say(self, line: str) -> tuple[Said, float]:
         """A line as it is typed; what was said to it, and how many seconds passed from its first byte to the last."""
-        self.tap.sent = self.tap.came = 0.0
-        begin = self.tap.clock()
+        self.tap.sent = self.tap.came = self.tap.began = 0.0  # others on its line may have their turn before
         said = await self.perform(f"the line {line}", say(self.shell.driver, line))
-        return said, max(self.tap.came - begin, 0.0)
+        return said, max(self.tap.came - self.tap.began, 0.0)
 
     # -- stop --------------------------------------------------------------------------------------------
 
