@@ -107,6 +107,14 @@ class TestLog:
             bed.run(short(bed))
         registers = bed.cell.controller("axis").registers
         assert registers(bed.cell.now)["R"] != "40"
+        stop = bed.bench.driver.stop
+
+        def refused():  # type: ignore[no-untyped-def]
+            bed.bench.driver.stop = stop
+            raise DriverError("GS-C200S", "is busy and does not obey Z")
+            yield
+
+        bed.bench.driver.stop = refused
         bed.shell.perform(left_safe(short(bed), bed.bench))
         assert not bed.shell.perform(bed.bench.driver.moving())
         assert [registers(bed.cell.now)[name] for name in "STR"] == ["60", "400", "40"]

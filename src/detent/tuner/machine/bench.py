@@ -113,8 +113,11 @@ class Bench:
         yield from self.driver.move_by(steps)
 
     def end(self) -> Steps[None]:
-        """Stop through the ramp, and wait until it stands; at once, if it does not."""
-        yield from self.driver.stop()
+        """Stop through the ramp, and wait until it stands; at once, if it does not.
+
+        A unit that is busy with something else may refuse to stop: every motion of a trial ends by itself.
+        """
+        yield from attempt(self.driver.stop())
         yield from self.rest(10.0)
 
 
