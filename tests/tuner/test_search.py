@@ -197,7 +197,7 @@ def test_a_map_has_a_rate_and_a_time_for_each_point() -> None:
     assert rows[0].startswith('"T: slew speed, 10 steps/s","R: ramp length, steps",')
     assert len(rows) == 1 + len(found.x) * len(found.y)
     assert (found.times[0] <= found.times[-1]).all()  # longer ramps take longer
-    with pytest.raises(TunerError, match="not written"):
+    with pytest.raises(TunerError, match="before it was whole"):
         loss_map(made, point, columns=2, rows=2, variants=4, cancelled=lambda: True)
 
 

@@ -24,8 +24,9 @@ class SerialPort:
         try:
             import serialx
         except Exception as error:  # it is not for every system, and says so in many ways
-            why = f"--serial needs serialx, which cannot be loaded ({error})"
-            raise EndpointError(f"{why}: {how_to_install()}") from error
+            missing = isinstance(error, ModuleNotFoundError) and error.name == "serialx"
+            why = "is not installed" if missing else f"cannot be loaded ({error})"
+            raise EndpointError(f"--serial needs serialx, which {why}: {how_to_install()}") from error
         self.address = address
         if _is_pseudo_terminal(address):  # it carries bytes, and Linux refuses it any other format
             form = form._replace(data_bits=8, parity="none")
