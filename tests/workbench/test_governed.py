@@ -192,8 +192,9 @@ def test_a_step_ends_where_the_windows_let_the_cell_stop() -> None:
 def test_who_waits_is_told_when_the_cell_begins_anew() -> None:
     async def scene(bench: Bench) -> None:
         waits = asyncio.create_task(ask(bench, "wait", position=7))
-        await ask(bench, "step", time="10 ms")
-        await bench.restart()
+        while not waits.done():  # it may be heard behind the first of them
+            await ask(bench, "step", time="10 ms")
+            await bench.restart()
         told = await waits
         assert (told["reached"], told["time_ns"]) == (False, 0)
         assert (await ask(bench, "pins"))["time_ns"] == 0

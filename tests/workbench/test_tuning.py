@@ -33,6 +33,7 @@ def with_bench(model: str, do: Callable[[Moves, Tuning, Live], Any]) -> None:
     async def run() -> None:
         bench = await Bench.open(model, pace=1e3)
         try:
+            await bench.until(lambda state: all(unit.state != "starting" for unit in state.units.values()))
             live = Live()
             moves = Moves(bench, live)
             await do(moves, Tuning(moves, live), live)
