@@ -143,7 +143,8 @@ from ophyd import EpicsMotor
 from ophyd.sim import det
 from ophyd.utils import LimitError
 told = {}
-motor = EpicsMotor("T:m1", name="motor")
+# at once, the next move of a scan may begin while ophyd still tells of the last one, and then forgets who waits
+motor = EpicsMotor("T:m1", name="motor", settle_time=0.05)
 motor.wait_for_connection(timeout=180)
 told["limits"] = list(motor.limits)
 told["egu"] = motor.egu
