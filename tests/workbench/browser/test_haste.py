@@ -206,9 +206,8 @@ def test_a_question_about_one_file_is_no_question_about_another(program: Window,
     held_back(program, "write_file")
     name.press("Enter")
     name.fill("two.gsc")  # before the answer is there
-    released(program)
-    program.until(QUIET)
     name.press("Enter")
+    released(program)
     program.page.locator(".program-asks", has_text="two.gsc is there already").wait_for()
     assert (workbench.folder / "two.gsc").read_text() == "; as it was\n"
     program.page.locator(".program-dialog button", has_text="Cancel").click()

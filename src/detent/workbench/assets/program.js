@@ -536,16 +536,22 @@ class Program {
       }),
     );
     const mine = (this.choosing = {});
-    let under = false; // one at a time
+    let under = false, // one at a time
+      again = false; // it was asked for meanwhile
     form.onsubmit = async (/** @type {Event} */ event) => {
       event.preventDefault();
       const asked = name.value;
+      if (under) again = true;
       if (!asked || under) return;
       under = true;
+      again = false;
       const done = await action(asked, over === asked).finally(() => (under = false));
       if (this.choosing !== mine) return; // the dialog was opened for something else meanwhile
       if (typeof done === "string") {
-        if (name.value !== asked) return; // the question is about another file by now
+        if (name.value !== asked) {
+          if (again) form.requestSubmit(); // for the file that is named by now; never the answer to a question unseen
+          return;
+        }
         over = asked;
         asks.textContent = done;
         submit.textContent = "Replace";
