@@ -1,6 +1,7 @@
 import threading
 from collections.abc import Iterator
 from concurrent.futures import CancelledError
+from copy import deepcopy
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ from tests.realtime.controlled import controlled, no_file, one, slide
 from detent.cell.actions import Send, TimedAction
 from detent.cell.cell import Cell
 from detent.cell.description import parse, single
+from detent.cell.recording import Log
 from detent.realtime import verbs
 from detent.realtime.control import Control, Ending
 from detent.realtime.service import Service
@@ -215,8 +217,22 @@ def test_a_long_journal_forgets_its_beginning_and_counts_it() -> None:
     for n in range(100):
         log.append(n)
     assert list(log)[-10:] == list(range(90, 100))
-    assert log.forgotten + len(log) == 100
+    assert log.forgotten + len(log) == log.appended == 100
     assert len(log) <= 20
+    assert log.since(97) == [97, 98, 99]
+    assert log.since(100) == []
+    assert log.since(0) == list(log), "of what is forgotten nothing"
+
+
+def test_a_journal_that_parted_from_its_copy_tells_its_own_newest() -> None:
+    for kind in (Log[int], RecentLog[int]):
+        log = kind()
+        for n in range(4):
+            log.append(n)
+        twin = deepcopy(log)
+        log.append(4)
+        assert (log.since(3), twin.since(3)) == ([3, 4], [3])
+        assert (log.appended, twin.appended) == (5, 4)
 
 
 def test_a_journal_of_long_actions_takes_no_more_room() -> None:

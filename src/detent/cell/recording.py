@@ -63,6 +63,8 @@ class Log(Generic[T]):
 
     __slots__ = ("_items", "_size")
 
+    forgotten: int = 0  # items at its beginning that are no longer kept: none, but in logs that forget
+
     def __init__(self) -> None:
         self._items: list[T] = []
         self._size = 0  # items that are ours; a copy may have appended more
@@ -79,6 +81,15 @@ class Log(Generic[T]):
             self._items = self._items[: self._size]
         self._items.append(item)
         self._size += 1
+
+    @property
+    def appended(self) -> int:
+        """How many items were added since it began, those that are forgotten among them."""
+        return self.forgotten + self._size
+
+    def since(self, count: int) -> list[T]:
+        """What was added behind the first `count` items; of what is forgotten nothing."""
+        return self._items[max(count - self.forgotten, 0) : self._size]
 
     def take(self) -> list[T]:
         """Everything that is in it; it begins anew. Copies keep what they have."""

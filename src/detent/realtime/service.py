@@ -196,8 +196,7 @@ class Service:
 
     def journal(self) -> tuple[int, Sequence[TimedAction]]:
         """How many deeds are forgotten, and those behind them."""
-        journal = self.cell.journal
-        return int(getattr(journal, "forgotten", 0)), list(journal)
+        return self.cell.journal.forgotten, list(self.cell.journal)
 
     def standing(self) -> Answer:
         """Of its time nothing else is to be said."""

@@ -148,9 +148,7 @@ class DrivenEngine(Engine):
                 self._taken.pop()
                 self._count -= 1
         certain = self._driven.now - self._driven.plan.lead - self._driven.lag - CERTAIN - SPARE
-        journal = self._driven.cell.journal
-        forgotten = int(getattr(journal, "forgotten", 0))
-        waiting = iter(list(journal)[max(self._count - forgotten, 0) :])
+        waiting = iter(self._driven.cell.journal.since(self._count))
         action = next(waiting, None)
         while history.now < certain and not history.stopped and time.monotonic_ns() - wall < BUDGET:
             until = min(history.now + SLICE, certain)

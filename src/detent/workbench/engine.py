@@ -34,7 +34,6 @@ from detent.cell.real_pins import unreal
 from detent.cell.recording import Entry
 from detent.cell.stores import Stores
 from detent.controllers import catalogue
-from detent.lines.line import Line
 from detent.outputs.units import views
 from detent.pins import Level
 from detent.realtime import breaking
@@ -309,10 +308,7 @@ class Engine:
 
     def _state(self) -> State:
         history, pace = self.history, self._pace
-        names = history.cell.wiring.names
-        stops: dict[str, set[int]] = {}
-        for unit, address in history.breakpoints:
-            stops.setdefault(names[unit], set()).add(address)
+        lines = look.lines(history)
         return State(
             now=history.now,
             begin=history.begin,
@@ -326,21 +322,17 @@ class Engine:
             motors=look.motors(history),
             faults=look.faults(history),
             branches=tuple((branch.number, branch.at, branch.end) for branch in history.branches),
-            breakpoints={name: frozenset(addresses) for name, addresses in stops.items()},
+            breakpoints=look.breakpoints(history),
             break_on_errors=history.break_on_errors,
             marks=(),
-            formats={name: str(line.format) for name, line in self._named_lines()},
-            speaking={name: line.host_busy_until for name, line in self._named_lines()},
+            formats={name: str(line.format) for name, line in lines.items()},
+            speaking={name: line.host_busy_until for name, line in lines.items()},
             dropped=sum(endpoint.dropped for _, endpoint in self._opened),
             faster=self._faster,
             real=self._real_state(),
             queue=self.waiting.queue,
             idle=pace.free and not pace.held and history.cell.next_event() is None,
         )
-
-    def _named_lines(self) -> list[tuple[str, Line]]:
-        cell = self.history.cell
-        return list(zip(cell.wiring.line_names, cell.lines, strict=True))
 
     def _mark_entry(self, unit: int, entry: Entry) -> None:
         self._marks.entry(self.history.cell.wiring.names[unit], entry)

@@ -182,8 +182,7 @@ class GovernedMachine(Governed):
 
     def journal(self) -> tuple[int, Sequence[TimedAction]]:
         """How many deeds are forgotten, and those behind them."""
-        journal = self.cell.journal
-        return int(getattr(journal, "forgotten", 0)), list(journal)
+        return self.cell.journal.forgotten, list(self.cell.journal)
 
     def standing(self) -> Answer:
         """It never stands."""

@@ -146,6 +146,21 @@ def kind_of(line: Line) -> str:
     )
 
 
+def lines(history: History) -> dict[str, Line]:
+    """The lines of the cell by their names."""
+    cell = history.cell
+    return dict(zip(cell.wiring.line_names, cell.lines, strict=True))
+
+
+def breakpoints(history: History) -> dict[str, frozenset[int]]:
+    """The addresses at which it stops, of each unit that has any."""
+    found: dict[str, frozenset[int]] = {}
+    for index, address in history.breakpoints:
+        name = history.cell.wiring.names[index]
+        found[name] = found.get(name, frozenset()) | {address}
+    return found
+
+
 def units(history: History) -> dict[str, UnitState]:
     """The units where the cell stands."""
     cell, names = history.cell, history.cell.wiring.names

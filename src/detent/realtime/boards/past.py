@@ -38,7 +38,7 @@ class Past:
 
     def keep(self) -> Moment:
         """Keep a copy of the cell as it is. Everything it did must have been taken over."""
-        moment = Moment(self.cell.copy(), _made(self.cell), self._counts())
+        moment = Moment(self.cell.copy(), self.cell.journal.appended, self._counts())
         self.moments.append(moment)
         return moment
 
@@ -72,7 +72,7 @@ class Past:
         """
         cell, present = self.cell, self.cell.now
         base = [moment for moment in self.moments if moment.now <= at][-1]
-        since = _since(cell, base.actions)
+        since = cell.journal.since(base.actions)
         vars(cell).update(vars(base.cell.copy()))
         later = [action for action in since if action.at > at and not drop(action)]
         for action in since:
@@ -100,12 +100,3 @@ def perform(cell: Cell, action: TimedAction) -> None:
     cell.run_to(action.at)
     cell.do(action.what)
     cell.run_to(cell.now)
-
-
-def _made(cell: Cell) -> int:
-    return int(getattr(cell.journal, "forgotten", 0)) + len(cell.journal)
-
-
-def _since(cell: Cell, count: int) -> list[TimedAction]:
-    forgotten = int(getattr(cell.journal, "forgotten", 0))
-    return list(cell.journal)[max(count - forgotten, 0) :]
