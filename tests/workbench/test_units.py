@@ -366,6 +366,93 @@ def test_stop_comes_before_what_is_pending(tmp_path: Path) -> None:
         at_desk(tmp_path, scene)
 
 
+SHARED = {  # a line that several share: what is said of each of them, and the lines that let them run on
+    "gs-c200": ('straps = { SEL2 = 0, SEL1 = 1, SEL0 = 1 }', 'straps = { SEL2 = 1, SEL1 = 0, SEL0 = 1 }',
+                'straps = { SEL2 = 0, SEL1 = 0, SEL0 = 1 }'),
+    "dcb-274": ('options = { name = "A" }', 'options = { name = "B" }', 'options = { name = "C" }'),
+    "bs0610": ("",),
+}  # fmt: skip
+REACHED = {"gs-c200": ("address=1", "address=2", "address=3"), "dcb-274": ("name=A", "name=B", "name=C"),
+           "bs0610": ("motor=X", "motor=Y")}  # fmt: skip
+RUN = {"gs-c200": ("T300", "G+"), "dcb-274": ("M300",), "bs0610": ("300R", "900000G")}
+
+
+@contextmanager
+def shared(model: str) -> Iterator[tuple[str, Cell]]:
+    """Units of `model` on one line: where it is, and their cell."""
+    names = "abc"[: len(SHARED[model])]
+    text = "".join(
+        f'[units.{name}]\nmodel = "{model}"\n{more}\n' for name, more in zip(names, SHARED[model], strict=True)
+    )
+    text += f"[lines.bus]\nunits = {list(names)}\n".replace("'", '"')
+    endpoints = [EndpointSpec("tcp", "127.0.0.1:0")]
+    with Service(parse(text, "cell"), lambda file: "", endpoints) as service, service.in_thread():
+        yield service.endpoints[0].address, service.cell
+
+
+def axes(cell: Cell) -> list[str]:
+    """How each axis of a cell stands, in a word."""
+    return [unit.status(cell.now, axis).state for unit in cell.controllers().values() for axis in unit.axes]
+
+
+def test_a_line_to_a_motor_of_a_board_is_for_that_motor(tmp_path: Path) -> None:
+    async def scene(desk: Desk) -> None:
+        names = [await desk.units.unit_connect("bs0610", address, f"patience=5 {where}") for where in REACHED["bs0610"]]
+        for at, name in enumerate(names):
+            for other in names:  # whichever was asked last is the one that the board has chosen
+                await desk.units.unit_say(other, "-1?")
+            await desk.units.unit_say(name, f"{100 + at}GI")
+        for at, name in enumerate(names):
+            await desk.until(name, lambda facts, at=at: facts["position"] == 100 + at)  # type: ignore[misc]
+
+    with shared("bs0610") as (address, _):
+        at_desk(tmp_path, scene)
+
+
+@pytest.mark.parametrize("presses", [1, 2])
+@pytest.mark.parametrize("model", SHARED)
+def test_stop_stops_each_unit_of_a_line_that_several_share(tmp_path: Path, model: str, presses: int) -> None:
+    async def scene(desk: Desk) -> None:
+        names = [await desk.units.unit_connect(model, address, f"patience=5 {where}") for where in REACHED[model]]
+        for name in names:
+            for line in RUN[model]:
+                told = await desk.units.unit_say(name, line)
+                assert not told["refused"], told
+        for name in names:
+            await desk.until(name, lambda facts: facts["moving"])
+        told_all = await asyncio.gather(*(desk.stopping.stop_all() for _ in range(presses)))
+        assert [len(told) for told in told_all] == [len(names)] * presses
+        words = "stops by its ramp" if presses == 1 else "stopped at once"
+        assert [one.rpartition(": ")[2] for one in told_all[-1]] == [words] * len(names)
+        for name in names:
+            await desk.until(name, lambda facts: facts["moving"] is False)
+            assert desk.facts(name)["outcome"] == words
+
+    with shared(model) as (address, cell):
+        at_desk(tmp_path, scene)
+        assert set(axes(cell)) == {"ready"}
+
+
+def test_a_unit_that_is_dead_delays_no_stop_of_others_on_its_line(tmp_path: Path) -> None:
+    async def scene(desk: Desk) -> None:
+        dead, living = [await desk.units.unit_connect("gs-c200", address, f"patience=1 address={n}") for n in (7, 2)]
+        await desk.until(dead, lambda facts: facts["trouble"])
+        await desk.until(living, lambda facts: facts["state"] and not facts["trouble"])
+        for line in RUN["gs-c200"]:
+            await desk.units.unit_say(living, line)
+        over = []
+        stops = [asyncio.create_task(desk.units.unit_stop(name)) for name in (dead, living)]
+        for stop, name in zip(stops, (dead, living), strict=True):
+            stop.add_done_callback(lambda _, name=name: over.append(name))  # type: ignore[misc]
+        told = await asyncio.gather(*stops, return_exceptions=True)
+        assert over == [living, dead]
+        assert isinstance(told[0], StopFailed)
+        assert told[1] == "stops by its ramp"
+
+    with shared("gs-c200") as (address, _):
+        at_desk(tmp_path, scene)
+
+
 @pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "bs0610", "supersigma"])
 def test_a_unit_that_stalls_is_unknown_and_stop_says_that_it_was_not_confirmed(tmp_path: Path, model: str) -> None:
     async def stall(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

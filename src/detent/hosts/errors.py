@@ -46,6 +46,11 @@ class DriverError(RuntimeError):
         self.told = one_line(f"{unit}: {what}{exchange}")
 
 
+def told(error: BaseException) -> str:
+    """What went wrong, for whoever does not call from Python."""
+    return error.told if isinstance(error, DriverError) else str(error)
+
+
 class NoAnswer(DriverError, TimeoutError):
     """Nothing, or not all of an answer, came in time."""
 

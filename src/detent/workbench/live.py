@@ -14,6 +14,8 @@ from typing import TypeAlias
 from pydantic import ValidationError, validate_call
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from detent.hosts.errors import told
+
 Value: TypeAlias = "str | int | float | bool | Sequence[Value] | Mapping[str, Value] | None"
 Call: TypeAlias = Callable[..., Awaitable[object]]
 
@@ -96,7 +98,7 @@ class Live:
             first = error.errors()[0]
             window.reply({"id": number, "error": f"{name}: {first['msg']} (it is {first.get('input')!r})"})
         except MISTAKES as error:
-            words = error.args[0] if isinstance(error, KeyError) and error.args else error
+            words = error.args[0] if isinstance(error, KeyError) and error.args else told(error)
             window.reply({"id": number, "error": str(words) or type(error).__name__})
 
 

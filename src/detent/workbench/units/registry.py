@@ -18,6 +18,7 @@ from detent.assembler import AssemblyFailed, assemble
 from detent.controllers import catalogue
 from detent.hosts.axis import Axis
 from detent.hosts.backups import Backup, BackupError
+from detent.hosts.errors import told
 from detent.hosts.exchange import Steps
 from detent.outputs.files import write_whole
 from detent.workbench.folder import Folder
@@ -71,7 +72,7 @@ class Units:
         beside = next((unit for unit in self._units.values() if unit.address == address), None)
         unit = await Unit.open(name, model, address, options_of(options), self._tell, beside)
         self._units[name] = unit
-        self._stopping.add(name, lambda: self._stop(unit))
+        self._stopping.add(name, unit.stop)
         self._tell(unit)
         self._live.put({"r.names": list(self._units)})
         unit.begin()
@@ -86,7 +87,7 @@ class Units:
         del self._units[name]
         self._stopping.remove(name)
         self._live.put({"r.names": list(self._units)})
-        await unit.close(port=all(one.address != unit.address for one in self._units.values()))
+        await unit.close()
 
     async def close(self) -> None:
         """Let go of all of them."""
@@ -136,13 +137,7 @@ class Units:
 
     async def unit_stop(self, name: Name) -> str:
         """Stop one unit; once more stops it at once. Raises StopFailed."""
-        return await self._stop(self._unit(name))
-
-    async def _stop(self, unit: Unit) -> str:
-        for other in list(self._units.values()):  # the line is free for it
-            if other is not unit and other.address == unit.address:
-                await other.break_off()
-        return await unit.stop()
+        return await self._unit(name).stop()
 
     async def _shown(self, unit: Unit, action: Awaitable[object]) -> list[str]:
         """Do it; the lines that were sent meanwhile."""
@@ -171,7 +166,7 @@ class Units:
         try:
             return await self._said(unit, line)
         except (RuntimeError, ValueError, OSError) as error:
-            return {"unit": unit.name, "answers": [], "meaning": str(error), "refused": True, "ms": None}
+            return {"unit": unit.name, "answers": [], "meaning": told(error), "refused": True, "ms": None}
 
     async def _said(self, unit: Unit, line: str) -> dict[str, object]:
         said, seconds = await unit.say(line)
@@ -209,8 +204,8 @@ class Units:
         language = catalogue.language(unit.model)
         lines: list[str] = await unit.perform("reading the program", cast(Any, unit.shell.driver).read_program())
         left = getattr(unit.shell.driver, "left_over", "")
-        told = f"{language.comment} left of an older program at {left}, behind an end mark\n" if left else ""
-        return source_of(language, lines) + told
+        older = f"{language.comment} left of an older program at {left}, behind an end mark\n" if left else ""
+        return source_of(language, lines) + older
 
     async def unit_compare(self, name: Name, source: Text) -> list[str]:
         """How the program of a unit and `source` differ, as the lines of a diff; none: they are the same."""
@@ -263,10 +258,10 @@ class Units:
         before.parent.mkdir(parents=True, exist_ok=True)
         write_whole(before, there.text(explained(unit.model)).encode())
         try:
-            told: list[str] = await unit.perform("restoring", cast(Any, unit.shell.driver).restore(wanted.saved))
+            lines: list[str] = await unit.perform("restoring", cast(Any, unit.shell.driver).restore(wanted.saved))
         except RuntimeError as error:
-            raise RuntimeError(f"{error}; what the unit held before is in {before}") from error
-        return [*told, f"What it held before is in {before}"]
+            raise RuntimeError(f"{told(error)}; what the unit held before is in {before}") from error
+        return [*lines, f"What it held before is in {before}"]
 
     def _wanted(self, unit: Unit, file: str) -> Backup:
         try:

@@ -10,8 +10,9 @@ from detent.controllers.gsc200.pins import select
 from detent.controllers.phrase import Phrases
 from detent.hosts.axis import Axis
 from detent.hosts.dcb274 import Dcb274
-from detent.hosts.errors import DriverError
+from detent.hosts.errors import BadAnswer, DriverError, Refused, told
 from detent.hosts.exchange import Asynchronous, Progress, Steps
+from detent.hosts.genstepper import GenStepper
 from detent.hosts.typed import Said, say
 from detent.pins import HIGH, LOW, Level
 from detent.realtime.connect import connect_async, host
@@ -20,6 +21,7 @@ from detent.workbench.stopping import StopFailed
 from detent.workbench.units.asked import Look, look
 from detent.workbench.units.manual import ManualMoves, check_moves, manual_moves
 from detent.workbench.units.manual import run as run_at
+from detent.workbench.units.party import Party, Turn
 from detent.workbench.units.tap import Tap
 from detent.workbench.units.transcript import Transcript
 
@@ -34,6 +36,7 @@ DEAF_SECONDS: Final = 7.0  # the same for a DCB-274, which takes no line while i
 HALT_SECONDS: Final = 5.0  # and for that one
 LOOK_SECONDS: Final = 0.3  # that a look under way may still take when a stop comes: one takes 0.1 s at 9600 baud
 HOLD_SECONDS: Final = 1.0  # a key is let go if its window has not said for so long that it is held
+CHOICES: Final = ("X", "Y", "B")  # of the motors of a GenStepper board
 FORM: Final = ("baud", "data_bits", "stop_bits")
 WHOLE: Final = (*FORM, "address", "drive")  # options that are whole numbers
 NOT_ALIVE: Final = "the port is gone ({}): mend the cable, then connect again; nothing was sent since"
@@ -88,6 +91,9 @@ class Unit:
         shell = await connect_async(model, port, watch=unit._watch, **options)
         transcript = Transcript(phrases(model, options), numbers=model == "supersigma")
         unit.tap = Tap(shell.port, transcript, None if beside is None else beside.tap)
+        if beside is not None:
+            unit.party = beside.party
+        unit.party.units.append(unit)
         shell.port = unit.tap
         unit.shell = shell
         unit.written = " ".join(f"{key}={value}" for key, value in options.items())
@@ -101,6 +107,7 @@ class Unit:
     def __init__(self, name: str, model: str, address: str, told: Callable[["Unit"], None]) -> None:
         """Use `open`."""
         self.name, self.model, self.address, self._told = name, model, address, told
+        self.party: Party[Unit] = Party()
         self.written = ""  # its options
         self.paused = False
         self.rate = RATE
@@ -135,16 +142,17 @@ class Unit:
         self._failures, self.trouble, self.paused = 0, "", False
         self._tell()
 
-    async def close(self, *, port: bool = True) -> None:
+    async def close(self) -> None:
         """Let go of it, and of its port unless others share it. A key that is held is let go; else nothing is sent."""
         if self._held_until:
             with contextlib.suppress(StopFailed):
                 await self.stop()
         self._closed = True
-        await self.break_off()
+        await self._break_off()
         if self._loop is not None:
             self._loop.cancel()
-        if port:
+        self.party.units.remove(self)
+        if not self.party.units:
             await self.tap.close()
 
     @property
@@ -174,6 +182,8 @@ class Unit:
             raise UnitBusy(NOT_ALIVE.format(self.tap.lost))
         if self._stopping is not None or self._doing is not None:
             raise UnitBusy(f"{self.name}: {self.job or 'a stop'} is under way; wait for its end, or STOP it")
+        if self.party.stopping:
+            raise UnitBusy(f"{self.name}: another unit on its line is being stopped; wait for the end of that")
         self.job, self.progress, self.outcome = what, (0, 0, ""), ""
         self._doing = asyncio.create_task(self._do(steps))
         self._doing.add_done_callback(self._done)
@@ -200,9 +210,15 @@ class Unit:
         self._tell()
 
     async def say(self, line: str) -> tuple[Said, float]:
-        """A line as it is typed; what was said to it, and how many seconds passed from its first byte to the last."""
+        """A line as it is typed; what was said to it, and how many seconds passed from its first byte to the last.
+
+        It is for this motor: of a board with two it is chosen first, where a look at the other may have chosen that.
+        """
+        driver = self.shell.driver
+        if isinstance(driver, GenStepper) and line.strip()[:1].upper() not in CHOICES:
+            line = f"{driver.motor}{line.lstrip()}"
         self.tap.sent = self.tap.came = self.tap.began = 0.0  # others on its line may have their turn before
-        said = await self.perform(f"the line {line}", say(self.shell.driver, line))
+        said = await self.perform(f"the line {line}", say(driver, line))
         return said, max(self.tap.came - self.tap.began, 0.0)
 
     # -- stop --------------------------------------------------------------------------------------------
@@ -210,12 +226,15 @@ class Unit:
     async def stop(self) -> str:
         """Break off whatever is done, and stop the axis: by its ramp; at once if that fails, or at a second call.
 
-        In words what was done. Raises StopFailed where the unit has confirmed neither.
+        What others do on its line is broken off, too, but not their stops. In words what was done. Raises StopFailed
+        where the unit has confirmed neither.
         """
-        again = self._stopping is not None
-        self._held_until = 0.0
-        await self.break_off()
-        task = self._stopping = asyncio.create_task(self._stop(at_once=again))
+        before, self._held_until = self._stopping, 0.0
+        if before is not None:
+            before.cancel()
+        turn = self.party.ask(late=bool(self.trouble))
+        task = self._stopping = asyncio.create_task(self._stop(turn, before))
+        task.add_done_callback(lambda _: self.party.over(turn))
         self._tell()
         try:
             self.outcome = await asyncio.shield(task)
@@ -234,18 +253,29 @@ class Unit:
                 task.add_done_callback(self._stopped)
             self._tell()
 
-    async def _stop(self, *, at_once: bool) -> str:
+    async def _stop(self, turn: Turn, before: "asyncio.Task[str] | None") -> str:
+        if before is not None:
+            await asyncio.wait([before])
+        at_once = before is not None
+        await asyncio.gather(*(unit.make_way(0.0 if at_once else LOOK_SECONDS) for unit in self.party.units))
+        await turn.come.wait()
         driver = self.shell.driver
         assert isinstance(driver, Axis)
         why = ""
         patience = DEAF_SECONDS if isinstance(driver, Dcb274) else RAMP_SECONDS
         ways = ((driver.stop, patience, "stops by its ramp"), (driver.halt, HALT_SECONDS, "stopped at once"))
         for way, seconds, words in ways[at_once:]:
-            try:
-                await asyncio.wait_for(self.shell.perform(way()), seconds)
-                return words + (f", because {why}" if why else "")
-            except (DriverError, ValueError, OSError) as error:  # a TimeoutError is an OSError
-                why = why or str(error) or f"it did not take its stop command within {seconds:g} s"
+            for again in (False, True):
+                try:
+                    await asyncio.wait_for(self.shell.perform(way()), seconds)
+                    return words + (f", because {why}" if why else "")
+                except (BadAnswer, Refused) as error:
+                    if not again:
+                        continue  # that may have been the answer to what was broken off
+                    why = why or told(error)
+                except (DriverError, ValueError, OSError) as error:  # a TimeoutError is an OSError
+                    why = why or told(error) or f"it did not take its stop command within {seconds:g} s"
+                    break
         raise StopFailed(f"STOP was not confirmed: {why}. If it moves, switch off the supply of its motor")
 
     def _stopped(self, task: "asyncio.Task[str]") -> None:
@@ -256,16 +286,17 @@ class Unit:
             self.outcome = str(error) if error is not None else task.result()
         self._tell()
 
-    async def break_off(self) -> None:
-        """End whatever is done with it, looks too; the port is free then."""
-        if self._looking is not None and self._stopping is None:
+    async def make_way(self, patience: float = 0.0) -> None:
+        """End whatever is done with it but a stop; the port is free then. A look may still take so many seconds."""
+        if self._looking is not None and patience:
             # a look that goes well is over in a moment; the rest of its answer would come in the way of what follows
-            await asyncio.wait([self._looking], timeout=LOOK_SECONDS)
-        tasks = [task for task in (self._looking, self._doing, self._stopping) if task is not None]
-        for task in tasks:
-            task.cancel()
-        if tasks:
-            await asyncio.wait(tasks)
+            await asyncio.wait([self._looking], timeout=patience)
+        await _ended(self._looking, self._doing)
+
+    async def _break_off(self) -> None:
+        """End whatever is done with it, a stop too."""
+        await self.make_way()
+        await _ended(self._stopping)
 
     # -- a key that is held ------------------------------------------------------------------------------
 
@@ -304,7 +335,7 @@ class Unit:
         loop = asyncio.get_running_loop()
         due = loop.time()
         while not self._closed:
-            if self._doing is None and self._stopping is None and not self.tap.lost:
+            if self._doing is None and not self.party.stopping and not self.tap.lost:
                 if not self.paused and loop.time() >= due:
                     await self._look()
                     due = loop.time() + min(2.0 ** min(self._failures, 10) / self.rate, max(SLOWEST, 1 / self.rate))
@@ -338,7 +369,7 @@ class Unit:
             self._tell()
         elif isinstance(error, DriverError | ValueError | OSError):
             self._failures += 1
-            self._unknown(str(error))
+            self._unknown(told(error))
             if self.model == "dcb-274":  # the next question would begin by connecting anew, which a person must want
                 self.paused = True
                 self._tell()
@@ -356,6 +387,15 @@ class Unit:
 
     def _tell(self) -> None:
         self._told(self)
+
+
+async def _ended(*tasks: "asyncio.Task[Any] | None") -> None:
+    """Cancel these, and wait until they have ended."""
+    there = [task for task in tasks if task is not None]
+    for task in there:
+        task.cancel()
+    if there:
+        await asyncio.wait(there)
 
 
 def phrases(model: str, options: Mapping[str, Any]) -> Phrases:
