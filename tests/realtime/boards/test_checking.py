@@ -1,13 +1,17 @@
 """The check of a machine's wiring: inputs live, jogs that stop in the board, and nothing that moves unasked."""
 
+from collections.abc import Callable
+from random import Random
+
 import pytest
-from tests.realtime.boards.driven_bench import no_file
+from tests.realtime.boards.driven_bench import Wire, no_file
 from tests.realtime.boards.test_real_service import Wall
 
 from detent.cell.build import build
 from detent.cell.description import Problem, parse
 from detent.realtime.boards.checking import LEAD, Check, Leg, Trouble
 from detent.realtime.boards.drive import Opened, RealPins
+from detent.realtime.boards.equipment import Equipment
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.chips import Chips
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
@@ -37,7 +41,8 @@ class Bench:
         self.machine = Machine(axes={"x": MachineAxis("gpio2", "gpio3")}, switches=switches)
         self.fake = FakeBoard(self.machine, moves=400)
         self.fake.chips = Chips() if chips else {}
-        self.port, self.wall = FakePort(self.fake), Wall()
+        self.wall = Wall()
+        self.port: FakePort = Wire(self.fake, lambda: self.wall.now)
         described = parse(text, "cell.toml")
         real = RealPins(lambda news: None, lambda _: self.port, self.wall, self.wall.sleep)
         self.check = Check(Opened(described, no_file, real), described)
@@ -85,6 +90,32 @@ def test_a_jog_goes_there_and_back_and_lets_the_driver_go() -> None:
     on = next(tick for tick, pin, level in bench.machine.edges if pin == "gpio4" and not level)
     assert on < bench.machine.steps[0][0]
     assert bench.jog()[1].made == 100  # and once more
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_computer_that_is_busy_makes_no_check_fail(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is elsewhere while it makes a batch, for longer than a batch may be late."""
+    random, bench = Random(seed), Bench(TMC if seed % 2 else CELL)
+    stalls = 0
+
+    def busy(work: Callable[..., bool]) -> Callable[..., bool]:
+        def works(*given: object) -> bool:
+            nonlocal stalls
+            waits = work(*given)
+            if random.random() < 0.1:
+                bench.wall.now += random.randrange(60 * MS)
+                stalls += 1
+            return waits
+
+        return works
+
+    monkeypatch.setattr(Equipment, "commit", busy(Equipment.commit))
+    monkeypatch.setattr(Equipment, "feed", busy(Equipment.feed))
+    out, back = bench.jog(60, 400)
+    assert (out.made, back.made) == (60, 60)
+    assert bench.machine.axes["x"].position == 0
+    assert bench.fake.reason is None
+    assert stalls > 3
 
 
 def test_a_switch_stops_it_in_the_board_and_the_way_back_ends_where_it_began() -> None:

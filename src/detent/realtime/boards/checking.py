@@ -94,7 +94,7 @@ class Check:
         wanted = boards.commit_at()
         now = wall()
         if wanted is not None and wanted <= now:
-            boards.commit(boards.cell_at(now), now)
+            boards.commit(boards.cell_at(now), now, wall)
         elif wanted is not None:
             most = min(most, wanted - now)
         turn(boards, wall, self._real.sleep, most)
@@ -161,7 +161,7 @@ class Check:
         if axis.half and on:
             self._boards.outs[axis.half].now(False)
         now = self._real.wall()
-        self._boards.commit(self._boards.cell_at(now), now)
+        self._boards.commit(self._boards.cell_at(now), now, self._real.wall)
         self._pass(WAKING if on and axis.enable else 50 * MS)
 
     def _pass(self, span: Ns) -> None:
@@ -216,4 +216,4 @@ class Check:
             if axis.enable and not self._boards.outs[axis.enable].dead:
                 self._boards.outs[axis.enable].now(False)
         now = self._real.wall()
-        self._boards.commit(self._boards.cell_at(now), now)
+        self._boards.commit(self._boards.cell_at(now), now, self._real.wall)

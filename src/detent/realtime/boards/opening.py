@@ -97,7 +97,7 @@ def set_drivers(
         raise plan.problem(problem) from None
     began = wall()
     while waiting:
-        boards.commit(0, wall())
+        boards.commit(0, wall(), wall)
         turn(boards, wall, sleep)
         for event in boards.events():
             if isinstance(event, DriverFault):
@@ -124,7 +124,7 @@ def turn(boards: Boards, wall: Callable[[], WallNs], sleep: Sleep | None, most: 
         boards.receive(descriptor, now)
     for descriptor in writable:
         boards.flush(descriptor, now)
-    boards.due(now)
+    boards.due(now, wall)
 
 
 def _sleep(readers: Sequence[int], writers: Sequence[int], seconds: float) -> tuple[Sequence[int], Sequence[int]]:
