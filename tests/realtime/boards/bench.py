@@ -118,6 +118,7 @@ class Bench:
         """Until the motion is over, at the pins too."""
         self.until(lambda: not self.axes[name].moving, most)
         self.run(self.boards.lead + self.boards.steppers[name].lag + 100 * MS)
+        self.until(lambda: not self.boards.steppers[name].proving, most)
 
     def of(self, kind: type[E]) -> list[E]:
         """The events of one kind."""

@@ -154,6 +154,8 @@ class Bench:
         while self.wall < end and any(state.moving for state in self.driven.axes()):
             self.run(20 * MS)
         self.run(self.plan.lead + self.driven.lag + 150 * MS)
+        while self.wall < end and any(stepper.proving for stepper in self.boards.steppers.values()):
+            self.run(20 * MS)
 
     def type(self, unit: str, text: str) -> None:
         """The host of a unit sends a line, now: when the cell is at its present."""

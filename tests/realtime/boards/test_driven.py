@@ -1,11 +1,14 @@
 """A cell behind its pins, case by case: outputs, inputs, holds, held replies, memory, slips, failures, recovery."""
 
+import re
 from random import Random
+from typing import Any
 
 import pytest
 from tests.realtime.boards.driven_bench import Bench, pulses
 
 from detent.realtime.boards.events import DriverFault
+from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.states import Standing, Weight
 from detent.ticks import MS, SECOND, US, Ns
 
@@ -361,6 +364,37 @@ def test_an_emergency_stop_while_a_board_comes_back_stands_until_the_next_recove
         bench.type("x", "-7")
         bench.rest()
         assert bench.position("x") == bench.driven.axes()[0].shaft == stopped - 7
+
+
+@pytest.mark.parametrize(
+    ("back", "why"),
+    [
+        ({"spoil": lambda data, to_board: []}, r"boards\.b\.serial: it does not answer"),
+        ({"pins": 8}, r"hardware\.x\.outputs\.UO1: .* has no pin gpio8;"),
+        ({"leave_out": ("queue_digital_out",)}, r"boards\.b\.serial: .* has no queue_digital_out;"),
+    ],
+)
+def test_a_recovery_that_comes_to_nothing_is_told(back: dict[str, Any], why: str) -> None:
+    """Another board is at its address now, or something that is none; behind the next one it goes on."""
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        port = bench.ports["b"]
+        board = port.board
+        port.unplugged = True
+        bench.run(500 * MS)
+        board.clear()
+        port.unplugged = False
+        port.spoil = back.pop("spoil", None)
+        port.board = FakeBoard(**back, first_tick=board.now, reset="config_reset") if back else board
+        bench.driven.recover()
+        bench.run(8 * SECOND)
+        assert weights(bench) == [Weight.FAULT, Weight.FAULT]
+        assert re.search(rf"^x still stands: cell\.toml: {why}.*; mend that, then recover$", bench.news[-1].text)
+        assert re.search(why, bench.driven.axes()[0].why)
+        port.board, port.spoil = board, None
+        bench.driven.recover()
+        bench.run(5 * SECOND)
+        assert bench.driven.axes()[0].standing is Standing.DRIVEN
 
 
 def test_where_a_motor_stands_is_known_again_when_a_switch_has_stopped_it_and_not_before() -> None:

@@ -172,6 +172,18 @@ def test_a_board_that_falls_silent_is_lost() -> None:
     assert [event.reason for event in made.of(Lost)] == ["it does not answer any more"]
 
 
+@pytest.mark.parametrize("late", [2 * MS, 8 * MS, 25 * MS, 90 * MS])
+def test_a_board_whose_clock_falls_behind_has_lost_no_step(late: int) -> None:
+    """Its last steps come later than the host thinks: the count is looked at again before it is believed."""
+    made = bench()
+    made.move(constant_acceleration.move(200, 1500, 60, 300).train, 1)
+    made.until(lambda: not made.axes["slide"].moving)
+    made.ports[0].stand(late)
+    made.rest()
+    assert made.boards.steppers["slide"].counted() == 300
+    assert not made.of(CountDiffers)
+
+
 def test_steps_that_went_missing_are_told_at_rest() -> None:
     made = bench()
     made.move(constant_acceleration.move(200, 1500, 60, 300).train, 1)
@@ -180,6 +192,19 @@ def test_steps_that_went_missing_are_told_at_rest() -> None:
     made.rest()
     [differs] = made.of(CountDiffers)
     assert (differs.stepper, differs.shaft, differs.counted) == ("slide", 300, 297)
+
+
+def test_steps_that_went_missing_are_told_though_rests_are_short() -> None:
+    """Shorter than it takes to believe in a count at rest."""
+    made = bench()
+    for n in range(4):
+        made.move(constant_acceleration.move(1000, 1000, 1, 100).train, 1 - n % 2 * 2)
+        if n == 0:
+            made.run(60 * MS)
+            made.board.oids[0].position -= 3
+        made.until(lambda: not made.axes["slide"].moving)
+        made.run(50 * MS)
+    assert {differs.counted - differs.shaft for differs in made.of(CountDiffers)} == {-3}
 
 
 def test_a_board_with_another_configuration_is_started_again() -> None:

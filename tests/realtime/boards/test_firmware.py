@@ -180,9 +180,7 @@ class Host:
         assert not self.failed, self.events
         stepper = self.boards.steppers["slide"]
         self.until(lambda: stepper.over(self.machine.wall()) or self.failed)
-        core = self.boards.master.core
-        asked = [("stepper_position", oid) for oid in stepper.oids]
-        self.until(lambda: (stepper.proof_due() is None and not any(core.asking(*one) for one in asked)) or self.failed)
+        self.until(lambda: not stepper.proving or self.failed)
         assert not self.failed, self.events
 
     def stop_at(self, stop: Stopped, started: MotionStarted) -> None:

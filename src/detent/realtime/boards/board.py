@@ -13,7 +13,7 @@ from detent.realtime.boards.clock import Clock
 from detent.realtime.boards.core import Core
 from detent.realtime.boards.dictionary import BARE, Dictionary, Message
 from detent.realtime.boards.equipment import Equipment
-from detent.realtime.boards.events import Lost, Ready, Recovered, Refusal, ShutDown
+from detent.realtime.boards.events import BY_HAND, Lost, Ready, Recovered, Refusal, ShutDown
 from detent.realtime.boards.frames import ROOM, FrameError
 from detent.realtime.boards.outs import DigitalOut
 from detent.realtime.boards.probes import Probes
@@ -383,12 +383,12 @@ class Board:
             self.core.link.drop_waiting()
             self.core.command("emergency_stop")
             self._fall(State.SHUT_DOWN)
-            self.reason = "emergency stop"
+            self.reason = BY_HAND
             self.core.events.append(ShutDown(self.name, self.reason))
             self.core.link.flush(wall)
         elif self.state is State.CONNECTING and self._known:
             self._fall(State.LOST)
-            self.reason = "emergency stop"
+            self.reason = BY_HAND
 
     def recover(self, wall: WallNs) -> None:
         """Make it ready again after ShutDown or Lost (of which the port is open again); `Recovered` follows.

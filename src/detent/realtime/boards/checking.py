@@ -202,7 +202,7 @@ class Check:
                     raise Trouble(
                         f"{axis.stepper}: the board has counted {heard.counted} where {heard.shaft} were sent"
                     )
-            over = stepper.over(wall()) and stepper.proof_due() is None and not boards.stops[axis.stepper].firing
+            over = stepper.over(wall()) and not stepper.proving and not boards.stops[axis.stepper].firing
             if ending is None and over:
                 boards.stops[axis.stepper].disarm()
                 ending = wall() + ENDING

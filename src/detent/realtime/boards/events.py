@@ -6,6 +6,8 @@ from typing import NamedTuple, TypeAlias
 
 from detent.ticks import Ns
 
+BY_HAND = "emergency stop"  # the reason of a shutdown that somebody asked for
+
 
 class Ready(NamedTuple):
     """The board is configured and its inputs are read.

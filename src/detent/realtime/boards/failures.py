@@ -2,6 +2,7 @@
 
 from detent.realtime.boards.axis_ledger import AxisLedger
 from detent.realtime.boards.events import (
+    BY_HAND,
     CountDiffers,
     DriverFault,
     DriverSet,
@@ -59,7 +60,8 @@ class Failures(Rollback):
                     self._fault(ledger, f"the board has counted {counted} where the cell has {shaft}")
                     self._place(ledger, counted)
             case ShutDown(board, reason):
-                self._board_failed(board, f"board {board} has shut down: {reason}", None)
+                if reason != BY_HAND:  # `stop` has said so itself
+                    self._board_failed(board, f"board {board} has shut down: {reason}", None)
             case Lost(board, reason):
                 self._board_failed(board, f"board {board} is gone: {reason}", "sent")
             case Recovered():
@@ -87,11 +89,18 @@ class Failures(Rollback):
                     self._set(out, level, when)
 
     def _board_failed(self, board: str, why: str, position: str | None) -> None:
-        for ledger in self.ledgers:
-            if ledger.what.board == board and ledger.standing is not Standing.FAULT:
+        mine = [ledger for ledger in self.ledgers if ledger.what.board == board]
+        stood = all(ledger.standing is Standing.FAULT for ledger in mine)
+        for ledger in mine:
+            if ledger.standing is not Standing.FAULT:
                 self._fault(ledger, why, known=False)
                 if position is not None:
                     self._place(ledger, ledger.stepper.shaft)
+            else:
+                ledger.why, ledger.known = why, False
+        if stood:  # a recovery that came to nothing, or a board that failed in another way meanwhile
+            who = f"{', '.join(ledger.name for ledger in mine)} still stands: " if mine else ""
+            self._say(Weight.FAULT, f"{who}{why}; mend that, then recover")
 
     def _fault(self, ledger: AxisLedger, why: str, *, known: bool = True) -> None:
         """An axis does not move any more: its unit is halted, and told so whenever it tries."""
@@ -117,7 +126,7 @@ class Failures(Rollback):
         self.boards.emergency_stop(self._wall())
         for ledger in self.ledgers:
             if ledger.standing is Standing.DRIVEN:
-                self._fault(ledger, "emergency stop", known=False)
+                self._fault(ledger, BY_HAND, known=False)
 
     def abandon(self, why: str) -> None:
         """The cell cannot go on: every board stops at once, for good."""

@@ -18,10 +18,11 @@ from detent.realtime.boards.lag import SETTLED, Lag, Late
 from detent.realtime.boards.setup import StepperSetup
 from detent.realtime.boards.undo import Undo
 from detent.realtime.pace import WallNs
-from detent.ticks import SECOND, Ns
+from detent.ticks import MS, SECOND, Ns
 
 LONGEST = 64  # steps of a run: looking further ahead costs more than it saves where a commit cuts runs anyway
 NOWHERE = -(1 << 62)  # before everything: the first run gets a base of its own
+LOOK_AGAIN: WallNs = 100 * MS  # slower than any step whose time is a matter of doubt
 SPARE = 4  # entries of the move queue that are left to outputs
 
 
@@ -82,6 +83,7 @@ class Stepper:
         self._halted = True  # nothing is sent before `adopt` or `rewind`
         self._regaining = False
         self._proved = True  # the count was compared since the last pulse
+        self._doubted: tuple[int, WallNs] | None = None  # by how much the count differed, and when that is believed
 
     # -- configuration
 
@@ -251,7 +253,7 @@ class Stepper:
         self._told = self._sent = shaft
         self._halted = False
         self._regaining = True
-        self._proved = False
+        self._proved, self._doubted = False, None
 
     def next_pulse(self) -> Ns | None:
         """The cell time from which on the next pulse is certain; None if none is to come."""
@@ -438,19 +440,34 @@ class Stepper:
         if last is None:
             return None
         core = self._core
-        return core.clock.wall_at(last + core.ticks(self.setup.pulse * 2 + UNSURE))
+        at = core.clock.wall_at(last + core.ticks(self.setup.pulse * 2 + UNSURE))
+        return at if self._doubted is None else max(at, self._doubted[1])
+
+    @property
+    def proving(self) -> bool:
+        """Whether its count has yet to be compared, or is being asked for."""
+        return self.proof_due() is not None or any(self._core.asking("stepper_position", oid) for oid in self.oids)
 
     def prove(self, wall: WallNs) -> None:
-        """Ask the firmware for its count, and compare it unless something has been sent meanwhile."""
+        """Ask the firmware for its count, and compare it unless something has been sent meanwhile.
+
+        One that differs is believed when it differs by the same a while later, behind another motion perhaps: a clock
+        that runs behind what is known of it steps later.
+        """
         self._proved = True
         waiting = set(self.oids)
 
-        def came(message: Message, _: WallNs) -> None:
+        def came(message: Message, at: WallNs) -> None:
             self.position(message)
             waiting.discard(message.number("oid"))
             if waiting or not self._proved or self._halted or self._spans:
                 return
-            if self.counted() != self._told:
+            by = self.counted() - self._told
+            if not by:
+                self._doubted = None
+            elif self._doubted is None or self._doubted[0] != by:
+                self._doubted, self._proved = (by, at + LOOK_AGAIN), False
+            else:
                 core = self._core
                 core.events.append(CountDiffers(core.setup.name, self.name, self._told, self.counted()))
 

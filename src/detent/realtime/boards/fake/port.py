@@ -45,6 +45,11 @@ class FakePort:
         assert self._began is not None
         return self._began + -(-(tick - self._first) * 1_000_000 * SECOND // self._rate)
 
+    def stand(self, span: WallNs) -> None:
+        """The board's clock stands for so long, and then goes on."""
+        assert self._began is not None
+        self._began += span
+
     def run_to(self, wall: WallNs) -> None:
         """Let the board live up to `wall`; what it is sent arrives on the way."""
         while self._to_board and self._to_board[0][0] <= wall:
