@@ -4,31 +4,18 @@ Without numba everything works and gives the same numbers, some hundred times sl
 the remedy instead of looking dead (`check_size`).
 """
 
-from collections.abc import Callable
 from functools import cache
-from typing import Any
 
+from detent.compiled import Function, compiler, jit
 from detent.extras import how_to_install
 from detent.motors import kernel
 from detent.motors.motor import MotorError
 
 MOST_PLAIN_SUBSTEPS = 3_000_000  # of plain Python: about half a minute
 
-Kernel = Callable[..., Any]
-
 
 class TooLong(MotorError):
     """Too much for plain Python: numba is missing."""
-
-
-@cache
-def compiler() -> Any:
-    """The module numba, or None where it is not installed."""
-    try:
-        import numba
-    except ImportError:
-        return None
-    return numba
 
 
 def fast() -> bool:
@@ -37,16 +24,12 @@ def fast() -> bool:
 
 
 @cache
-def compiled(function: Kernel, **options: Any) -> Kernel:
+def compiled(function: Function) -> Function:
     """The function, compiled and kept on disk; itself without numba."""
-    numba = compiler()
-    if numba is None:
-        return function
-    made: Kernel = numba.njit(cache=True, error_model="numpy", **options)(function)
-    return made
+    return jit(function)
 
 
-def advance() -> Kernel:
+def advance() -> Function:
     """`kernel.advance`, as fast as it is to be had."""
     return compiled(kernel.advance)
 

@@ -7,9 +7,12 @@ Imported only where numba is. One file, as numba looks for changes only in the f
 compiled.
 """
 
-import numpy as np
-from numba import njit, prange
+from functools import partial
 
+import numpy as np
+from numba import prange
+
+from detent.compiled import jit
 from detent.motors.kernel import (
     ACC,
     AMPS,
@@ -47,7 +50,7 @@ ROWS = 8
 NEVER_LOST = 1e300
 
 
-@njit(cache=True, error_model="numpy")
+@jit
 def advance_lanes(  # type: ignore[no-untyped-def]
     state,
     par,
@@ -299,7 +302,7 @@ def advance_lanes(  # type: ignore[no-untyped-def]
     return t
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@partial(jit, parallel=True)
 def advance_all(  # type: ignore[no-untyped-def]
     state,
     par,

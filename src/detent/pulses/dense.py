@@ -5,10 +5,11 @@ are written so that the compiler makes vector code of them: one form each, over 
 """
 
 from collections.abc import Callable
+from functools import partial
 
-import numba as nb
 import numpy as np
 
+from detent.compiled import jit
 from detent.pulses.accelerating import TINY
 from detent.pulses.ramp_estimates import FROM_MIDDLE, SERIES, Chunk
 from detent.pulses.segment import Int64Array
@@ -17,7 +18,7 @@ from detent.ticks import Ns
 
 _WAYS = {"rooted": 0, "divided": 1, "rows": 2}
 
-_compiled = nb.njit(cache=True, error_model="numpy", fastmath={"contract"})
+_compiled = partial(jit, fastmath={"contract"})
 
 
 @_compiled
