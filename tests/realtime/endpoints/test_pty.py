@@ -1,3 +1,4 @@
+import itertools
 import os
 import select
 import socket
@@ -5,8 +6,8 @@ import subprocess
 import sys
 import termios
 import tty
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -218,13 +219,115 @@ def test_a_setting_is_unsettled_while_the_loop_has_other_work() -> None:
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux refuses formats on a pseudo-terminal")
-def test_the_process_beside_the_loop_ends_with_it() -> None:
-    """However it ends: the process has no other line to hang on."""
+def test_whoever_is_sooner_gets_time_for_it() -> None:
+    """The loop holds no lock of the terminal then, which a client and whoever unsettles it would wait for."""
+
+    class Somebody(Unsettling):
+        def watch(self, ours: int) -> bool:
+            return True
+
+    terminal = PseudoTerminal(unsettling=Somebody())
+    ours = terminal.reading(room=True)[-1]
+    with serial.Serial(terminal.address, timeout=0, **SETTINGS[0]) as client:
+        terminal.receive(ours, 1_000)
+        assert termios.tcgetattr(client.fileno())[5] == termios.B9600
+        deadline = terminal.deadline()
+        assert deadline is not None
+        assert deadline > 1_000
+        client.baudrate = 4800
+        terminal.receive(ours, 2_000)
+        assert terminal.deadline() == deadline + 1_000  # not between two settings
+        terminal.due(deadline + 1_000)
+        assert terminal.deadline() is None
+        assert termios.tcgetattr(client.fileno())[5] in unsettler.SERVING
+    terminal.close()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux refuses formats on a pseudo-terminal")
+def test_nobody_finds_the_speed_that_he_found_before() -> None:
+    """The C library looks before and after; what it finds twice is no difference."""
+    terminal = PseudoTerminal()
+    turns = bytearray(3)
+    with serial.Serial(terminal.address, timeout=0, **SETTINGS[0]) as client:
+        unsettler.unsettle(client.fileno(), unsettler.SERVING, turns, 1)  # of the opening
+        for speeds in (unsettler.SERVING, unsettler.BESIDE):
+            found = []
+            for number in range(2 * len(speeds)):
+                client.timeout = number  # sets everything again
+                unsettler.unsettle(client.fileno(), speeds, turns, 1)
+                unsettler.unsettle(client.fileno(), speeds, turns, 1)  # nothing to do any more
+                found.append(termios.tcgetattr(client.fileno())[5])
+            assert set(found) == set(speeds)
+            assert len(set(speeds)) > 1
+            assert all(one != other for one, other in itertools.pairwise(found))
+    assert not set(unsettler.SERVING) & set(unsettler.BESIDE)
+    assert 0 not in unsettler.UNUSUAL
+    assert (turns[0], turns[2]) == (0, 0)  # of other terminals
+    terminal.close()
+
+
+def descendants(process: int) -> dict[int, set[int]]:
+    """The processes that `process` started, with the processors that each may run on."""
+    children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    return {int(child): os.sched_getaffinity(int(child)) for child in children}
+
+
+def gone(processes: Iterable[int]) -> bool:
+    """Wait until none of `processes` lives; True. One that has ended may wait for its parent to look."""
+    for process in processes:
+        with suppress(OSError):
+            while Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z":
+                os.sched_yield()
+    return True
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux refuses formats on a pseudo-terminal")
+def test_there_is_a_process_for_each_processor_and_they_end_with_the_loop() -> None:
+    """However it ends: they have no other line to hang on."""
     ours, theirs = socket.socketpair()
     with theirs:
         process = subprocess.Popen([sys.executable, "-I", "-S", unsettler.__file__], stdin=theirs)
+    terminal = PseudoTerminal()
+    for _ in range(3):
+        socket.send_fds(ours, [b"\0"], [terminal.reading(room=True)[-1]])
+    with serial.Serial(terminal.address, timeout=0, **SETTINGS[0]) as client:
+        unusual(client.fileno())
+    beside: dict[int, set[int]] = {}
+    processors = os.sched_getaffinity(0)
+    while sum(map(len, beside.values())) != len(processors):  # not all of them may have begun yet
+        beside = descendants(process.pid)
+    assert len(beside) == min(16, len(processors))
+    held = Path(f"/proc/{process.pid}/fd")
+    while any("ptmx" in str(one.resolve()) for one in held.iterdir()):
+        os.sched_yield()  # the first gives terminals on, and keeps none
     ours.close()
     assert process.wait(180) == 0
+    assert gone(beside)
+    terminal.close()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux refuses formats on a pseudo-terminal")
+def test_a_loop_that_is_killed_leaves_no_process() -> None:
+    code = (
+        "from detent.realtime.endpoints.pty import PseudoTerminal\n"
+        "from detent.realtime.endpoints.unsettling import Unsettling\n"
+        "terminal = PseudoTerminal(unsettling=Unsettling())\n"
+        "print(terminal.address, flush=True)\n"
+        "input()\n"
+    )
+    server = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert server.stdin is not None
+    assert server.stdout is not None
+    with serial.Serial(server.stdout.readline().strip(), timeout=0, **SETTINGS[0]) as client:
+        unusual(client.fileno())  # by one of them: the loop does nothing
+        first = [*descendants(server.pid)]
+        beside = [child for one in first for child in descendants(one)]
+        assert beside
+        server.kill()
+        assert gone([*first, *beside])
+    server.wait()
+    server.stdin.close()
+    server.stdout.close()
 
 
 def unusual(descriptor: int) -> None:

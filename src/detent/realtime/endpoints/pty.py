@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import select
 import stat
 import struct
 import termios
@@ -12,10 +13,13 @@ from pathlib import Path
 
 from detent.realtime.endpoints.endpoint import MOST_READ, EndpointError, Outgoing
 from detent.realtime.endpoints.opened import Opened, Openings
-from detent.realtime.endpoints.unsettler import TELLS, UNUSUAL, unsettle
+from detent.realtime.endpoints.unsettler import SERVING, TELLS, unsettle
 from detent.realtime.endpoints.unsettling import Unsettling
 from detent.realtime.pace import WallNs
+from detent.ticks import MS
 from detent.uart import Chars
+
+_SOONER = 50 * MS  # behind the last setting: both at once would wait for each other's locks, and so would the client
 
 
 class PseudoTerminal:
@@ -50,7 +54,9 @@ class PseudoTerminal:
         self._owed: Chars = b""  # to the line: it has not heard yet that they left
         self._link: Path | None = None
         self._clients: Opened | None = None
-        self._unusual = UNUSUAL[-1]
+        self._turn = bytearray(1)
+        self._beside = False  # somebody else unsettles it, and sooner
+        self._unsettled_by: WallNs | None = None
         self._unsettling = unsettling
         try:
             tty.setraw(self._theirs)
@@ -60,8 +66,7 @@ class PseudoTerminal:
             if TELLS:
                 fcntl.ioctl(self._ours, termios.TIOCPKT, struct.pack("i", 1))
                 self._unsettle()
-                if unsettling is not None:
-                    unsettling.watch(self._ours)
+                self._beside = unsettling is not None and unsettling.watch(self._ours)
             self._clients = Opened(self._device, openings)
             if link is not None:
                 _point(link, self._device)
@@ -87,11 +92,13 @@ class PseudoTerminal:
         return (self._ours,) if self._outgoing else ()
 
     def deadline(self) -> WallNs | None:
-        """Never."""
-        return None
+        """When a setting has had time to be undone by whoever does it sooner than this loop."""
+        return self._unsettled_by
 
     def due(self, wall: WallNs) -> None:
-        """Nothing is ever due."""
+        """It has had that."""
+        self._unsettled_by = None
+        self._unsettle()
 
     def receive(self, descriptor: int, wall: WallNs) -> Chars:
         """What the client wrote; and that the last one has left, where that means something."""
@@ -107,12 +114,15 @@ class PseudoTerminal:
             return read
         self._said |= len(read) > 1
         if read[:1] != b"\0":  # not data
-            self._unsettle()
+            if self._beside:
+                self._unsettled_by = wall + _SOONER
+            else:
+                self._unsettle()
             return b""
         return read[1:]
 
     def _unsettle(self) -> None:
-        self._unusual = unsettle(self._theirs, self._unusual)
+        unsettle(self._theirs, SERVING, self._turn)
 
     def send(self, data: bytes, wall: WallNs) -> None:
         """Give `data` to the client, now or when it reads."""
@@ -136,7 +146,8 @@ class PseudoTerminal:
             if self._said:
                 self._owed, self._said = self._parting, False
             self._outgoing.forget()
-            termios.tcflush(self._theirs, termios.TCIFLUSH)
+            if select.select((self._theirs,), (), (), 0)[0]:  # or else no lock is taken that a client may wait for
+                termios.tcflush(self._theirs, termios.TCIFLUSH)
 
     def close(self) -> None:
         """Close the terminal; remove the link if it still is ours."""

@@ -1,4 +1,4 @@
-"""The process that unsettles pseudo-terminals (`unsettler`), as whoever serves them has it."""
+"""The processes that unsettle pseudo-terminals (`unsettler`), as whoever serves them has them."""
 
 import socket
 import sys
@@ -9,21 +9,25 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import subprocess
 
+_PATIENCE = 1.0  # s
+
 
 class Unsettling:
-    """The process, for any number of terminals. Where it cannot be had, whoever serves the terminals is slower."""
+    """The processes, for any number of terminals. Where they cannot be had, whoever serves the terminals is slower."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._line: socket.socket | None = None
 
-    def watch(self, ours: int) -> None:
-        """Unsettle the terminal of which `ours` is the end of whoever serves it, until `close`."""
+    def watch(self, ours: int) -> bool:
+        """Unsettle the terminal of which `ours` is the end of whoever serves it, until `close`; whether it is so."""
         with suppress(OSError):
             if self._line is None:
                 self._start()
             if self._line is not None:
                 socket.send_fds(self._line, [b"\0"], [ours])
+                return True
+        return False
 
     def _start(self) -> None:
         script = Path(__file__).with_name("unsettler.py")
@@ -42,11 +46,16 @@ class Unsettling:
             )
 
     def close(self) -> None:
-        """End it: no terminal stays open because of it. May be called twice."""
+        """End them: no terminal stays open because of them. May be called twice."""
         if self._line is not None:
             self._line.close()
             self._line = None
         if self._process is not None:
-            self._process.kill()
-            self._process.wait()
+            import subprocess
+
+            try:
+                self._process.wait(_PATIENCE)  # they end with the line
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
             self._process = None
