@@ -2,8 +2,9 @@
 
 import inspect
 import random
+import re
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from typing import Any
 
 import pytest
@@ -219,6 +220,70 @@ def test_every_call_on_a_line_that_babbles_ends_in_time_with_a_short_error(model
         assert "\n" not in told
         if name not in ("wait", "wait_idle"):
             assert port.now < (20 if "program" in name or name == "save" else PATIENT[model]), name
+
+
+# -- a stop, whatever the line says ------------------------------------------------------------------------------
+
+NAMED = {f"dcb-274 {mode}": lambda port, mode=mode: BlockingDcb274(Dcb274("A", mode=mode), port)
+         for mode in ("party", "daisy", "sin10")}  # fmt: skip
+STOPPED_BY = {
+    "gs-c200": (rb"Z|K", 5), "gs-c200s": (rb"Z|K", 5), "supersigma": (rb"\x01[\x06\x07]", 1.5),
+    "dcb-274": (rb"@|\x1b", 5.5), "bs0610": (rb"XZ", 4), "dcb-274 party": (rb"A[@|]", 1.5),
+    "dcb-274 daisy": (rb"A[@|]\n", 2), "dcb-274 sin10": (rb"A[@|]\r", 1),
+}  # fmt: skip
+"""What stops an axis, with all that has to be said with it; seconds in which the call is over where nobody answers."""
+WAITS = {
+    "dcb-274 party": 0.35,
+    "dcb-274 daisy": 1.0,
+}  # seconds for the echo of the name; a chain has to have names first
+SHORTER = {"dcb-274": 3.5}  # seconds on one that babbles: only a silence may be a ramp
+
+
+class Overheard(Babbling):
+    """What is sent, and when; without noise nobody says a word."""
+
+    def __init__(self, noise: Iterator[bytes] | None) -> None:
+        super().__init__(noise or iter(()))
+        self.silent = noise is None
+        self.sent: list[tuple[float, bytes]] = []
+
+    def write(self, data: bytes) -> None:
+        self.sent.append((self.now, data))
+        super().write(data)
+
+    def receive(self, timeout: float) -> bytes:
+        if not self.silent:
+            return super().receive(timeout)
+        data, self.kept = self.kept, b""
+        self.now += 0.0 if data else max(timeout, 1e-6)
+        return data
+
+    def stopped(self, by: bytes) -> float:
+        """When what stops an axis was said, all of it, perhaps in pieces."""
+        for count in range(1, len(self.sent) + 1):
+            if re.search(by, b"".join(data for _, data in self.sent[:count])):
+                return self.sent[count - 1][0]
+        raise AssertionError("nothing that was sent stops an axis")
+
+
+@pytest.mark.parametrize("kind", ["silence", "random", "frames", "prompts", "letters", "nulls", "lines"])
+@pytest.mark.parametrize("way", ["stop", "halt"])
+@pytest.mark.parametrize("model", STOPPED_BY)
+def test_what_stops_an_axis_is_said_before_anything_is_waited_for(model: str, way: str, kind: str) -> None:
+    by, longest = STOPPED_BY[model]
+    for before in ("", "position", "moving"):
+        port = Overheard(None if kind == "silence" else noise(kind))
+        unit = {**DRIVERS, **NAMED}[model](port)
+        if before:
+            with suppress(DriverError):
+                getattr(unit, before)()
+        began = port.now
+        port.sent.clear()
+        with suppress(DriverError):
+            getattr(unit, way)()
+        wait = WAITS.get(model, 0.06)
+        assert port.stopped(by) - began <= wait, before
+        assert port.now - began <= (longest if kind == "silence" else SHORTER.get(model, longest)), before
 
 
 @pytest.mark.parametrize("kind", [DriverError, NoAnswer, BadAnswer, Refused, Busy, MotionFailed, PortLost])

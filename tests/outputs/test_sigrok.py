@@ -11,7 +11,7 @@ from tests.outputs.recorded import BAR, DRILL, drilling, heard, interrupted, mov
 
 from detent.cell.recording import Recording
 from detent.controllers.device import Powered
-from detent.outputs import sigrok
+from detent.outputs import arrays, signals, sigrok, step_file, vcd
 from detent.outputs.signals import Signals
 from detent.pins import PinSet
 from detent.ticks import MS, SECOND
@@ -101,9 +101,41 @@ def test_a_samplerate_too_low_for_a_channel_is_refused_with_one_that_will_do(tmp
 
 
 def test_a_run_too_long_for_its_samplerate_is_refused_with_one_that_fits(tmp_path):
-    signals = Signals(Recording(["bar"]), [BAR], 10**6 * SECOND)
-    with pytest.raises(ValueError, match=r"a samplerate of at most 17179, a shorter run, or a VCD"):
-        sigrok.write(tmp_path / "run.sr", signals)
+    seen = Signals(Recording(["bar"]), [BAR], 10**6 * SECOND)
+    with pytest.raises(ValueError, match=r"a samplerate of at most 8589, a shorter run, or a VCD"):
+        sigrok.write(tmp_path / "run.sr", seen)
+    for far in (10**6, 10**8):
+        with pytest.raises(ValueError, match="shorter run, or a VCD") as told:
+            sigrok.size(Signals(Recording(["bar"]), [BAR], 4 * 10**18), far)
+        assert str(told.value).count("\n") == 0
+
+
+@pytest.mark.parametrize("rate", [1, 3, 100])
+def test_a_long_silence_takes_few_members_at_any_samplerate(rate, tmp_path):
+    """A year takes what a minute does, but for the samples themselves."""
+    recording, _ = drilling()
+    path = tmp_path / "run.sr"
+    seconds = 10**6 // rate
+    names = ["bar.UO1", "bar.RDY"]
+    sigrok.write(path, Signals(recording, [BAR, DRILL], seconds * SECOND), samplerate=rate, names=names)
+    with ZipFile(path) as archive:
+        assert len(archive.namelist()) < 12
+    assert [len(samples) for samples in read(path)[2]] == [seconds * rate + 1] * 2
+
+
+def test_what_would_be_written_one_by_one_has_a_bound(tmp_path, monkeypatch):
+    recording, until = drilling()
+    seen = Signals(recording, [BAR, DRILL], until)
+    monkeypatch.setattr(signals, "MOST_PULSES", seen.pulse_count() - 1)
+    for write in (
+        lambda path: vcd.write(path, seen),
+        lambda path: list(vcd.pieces(seen)),
+        lambda path: arrays.write(path, seen),
+        lambda path: step_file.write(path, seen, 12_000_000, 1000),
+    ):
+        with pytest.raises(ValueError, match=r"there are \d+ pulses, and \d+ can be written: run for less"):
+            write(tmp_path / "file")
+        assert not list(tmp_path.iterdir())
 
 
 def test_a_channel_that_is_none_is_refused_with_those_there_are(tmp_path):

@@ -61,15 +61,20 @@ def write(cell: "Cell", source: "CellSource", files: ExportFiles) -> None:
 
     described = source.description
     seen = signals.of_cell(cell, {name: unit.shaft for name, unit in described.units.items()})
+    rate = files.sr_rate
+    if files.vcd is not None or files.npz is not None or files.steps is not None:
+        seen.pulse_count()  # nothing is written where one of the files cannot be
+    if files.sr is not None:
+        from detent.outputs import sigrok
+
+        rate = rate or sigrok.SAMPLERATE
+        sigrok.size(seen, rate)
     if files.vcd is not None:
         from detent.outputs import vcd
 
         with _told(files.vcd, vcd.size(seen), seen) as watch:
             vcd.write(files.vcd, seen, watch)
-    if files.sr is not None:
-        from detent.outputs import sigrok
-
-        rate = files.sr_rate or sigrok.SAMPLERATE
+    if files.sr is not None and rate is not None:
         with _told(files.sr, sigrok.size(seen, rate), seen, compressed=True) as watch:
             sigrok.write(files.sr, seen, samplerate=rate, watch=watch)
     if files.npz is not None:

@@ -41,14 +41,14 @@ def size(signals: Signals) -> int:
 def write(path: Path, signals: Signals, meta: Mapping[str, Any] | None = None, watch: Watch = nobody_looks) -> None:
     """Write the file, whole or not at all. `meta` must be fit for JSON; `watch` is told how far it is.
 
-    OSError if it cannot be written.
+    ValueError for more pulses than can be written; OSError if it cannot be.
     """
+    total, done = 3 * signals.pulse_count(), 0
     about = {"until_ns": signals.until, "units": {unit.name: _about(unit) for unit in signals.units}, **(meta or {})}
     text = np.array(json.dumps(about, sort_keys=True))
     with open_whole(path) as file, ZipFile(file, "w", ZIP_DEFLATED) as archive:
         archive.comment = MARK
         _put(archive, "meta", text.dtype, (), [text])
-        total, done = 3 * sum(unit.motion.pulse_count for unit in signals.units), 0
         for unit in signals.units:
             _put_unit(archive, unit, lambda pulses, before=done: watch(before + pulses, total))  # type: ignore[misc]
             _put_windings(archive, unit, signals)

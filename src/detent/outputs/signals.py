@@ -25,6 +25,7 @@ from detent.ticks import Ns
 from detent.uart import Sent
 
 MOST_CHANGES = 20_000_000  # of outputs, by programs that turn in loops: they are held one by one
+MOST_PULSES = 1_000_000_000  # of all units, where each is written: a file of tens of gigabytes
 WINDOW = 1 << 14  # pulses of a unit, or changes of a pin, in one window
 LATEST: Ns = (1 << 62) - 1  # later times, or sums of them, int64 does not hold
 
@@ -100,6 +101,13 @@ class Signals:
             if unit.name == name:
                 return unit
         raise KeyError(f"no unit {name!r} was recorded: there are {', '.join(unit.name for unit in self.units)}")
+
+    def pulse_count(self) -> int:
+        """How many step pulses there are to write one by one. ValueError for more than can be."""
+        total = sum(unit.motion.pulse_count for unit in self.units)
+        if total > MOST_PULSES:
+            raise ValueError(f"there are {total} pulses, and {MOST_PULSES} can be written: run for less")
+        return total
 
     def windows(self, limit: int = WINDOW) -> Iterator[tuple[Ns, Ns]]:
         """Windows (begin, end), end excluded, that cover 0 .. until; none has more than `limit` pulses of a unit."""

@@ -20,8 +20,8 @@ from detent.ticks import SECOND, Ns
 
 SAMPLERATE = 1_000_000  # a step pulse of 1.7 us takes two samples
 CHUNK = 1 << 19  # most samples in one member of the archive
-LONGEST: Ns = 10 * SECOND  # a member covers no longer time, so that its pulses fit memory
-MOST_SAMPLES = 1 << 34  # some minutes of work; an archive nobody opens
+WINDOW = 1 << 18  # most pulses of a unit in one member, so that they fit memory
+MOST_BYTES = 1 << 33  # of samples before they are compressed: a minute or two of work, and who opens it holds them all
 MOST_LATE = 64  # samples by which an edge may be stretched away from its time
 
 
@@ -53,8 +53,9 @@ def channels(signals: Signals, names: Sequence[str] | None = None) -> list[Chann
 
 
 def size(signals: Signals, samplerate: int = SAMPLERATE) -> int:
-    """How many bytes the samples have before they are compressed."""
-    return (signals.until * samplerate // SECOND + 1) * _unitsize(channels(signals))
+    """How many bytes the samples have before they are compressed. ValueError for more than can be written."""
+    chosen = channels(signals)
+    return _samples(signals, samplerate, chosen) * _unitsize(chosen)
 
 
 def write(
@@ -69,14 +70,8 @@ def write(
     """
     if samplerate < 1:
         raise ValueError(f"a samplerate is at least 1 sample a second, not {samplerate}")
-    samples = signals.until * samplerate // SECOND + 1
-    if samples > MOST_SAMPLES:
-        fits = (MOST_SAMPLES - 1) * SECOND // signals.until
-        raise ValueError(
-            f"{signals.until / SECOND:g} s at {samplerate} samples/s are {samples} samples, more than {MOST_SAMPLES}: "
-            f"take a samplerate of at most {fits}, a shorter run, or a VCD, which has no samplerate"
-        )
     chosen = channels(signals, names)
+    samples = _samples(signals, samplerate, chosen)
     with open_whole(path) as file, ZipFile(file, "w", ZIP_DEFLATED) as archive:
         archive.comment = MARK
         _put(archive, "version", b"2")
@@ -86,6 +81,18 @@ def write(
             _put(archive, f"logic-1-{number}", chunk)
             done += len(chunk) // _unitsize(chosen)
             watch(done, samples)
+
+
+def _samples(signals: Signals, samplerate: int, chosen: Sequence[Channel]) -> int:
+    samples, most = signals.until * samplerate // SECOND + 1, MOST_BYTES // _unitsize(chosen)
+    if samples > most:
+        fits = (most - 1) * SECOND // signals.until
+        slower = f"take a samplerate of at most {fits}, a" if fits else "take a"
+        raise ValueError(
+            f"{signals.until / SECOND:g} s at {samplerate} samples/s are {samples} samples, more than {most}: "
+            f"{slower} shorter run, or a VCD, which has no samplerate"
+        )
+    return samples
 
 
 def _put(archive: ZipFile, name: str, data: bytes) -> None:
@@ -111,9 +118,7 @@ def _unitsize(chosen: Sequence[Channel]) -> int:
 def _chunks(signals: Signals, chosen: Sequence[Channel], samplerate: int, samples: int) -> Iterator[bytes]:
     """The samples of all channels, a chunk at a time."""
     samplers = [_Sampler(channel, samplerate) for channel in chosen]
-    size = min(CHUNK, max(LONGEST * samplerate // SECOND, 1))
-    for first in range(0, samples, size):
-        count = min(size, samples - first)
+    for first, count in _members(signals, samplerate, samples):
         steady = np.zeros((1, _unitsize(chosen)), np.uint8)  # what does not change in this chunk
         changing: list[tuple[int, Levels]] = []
         for number, sampler in enumerate(samplers):
@@ -129,6 +134,19 @@ def _chunks(signals: Signals, chosen: Sequence[Channel], samplerate: int, sample
         for number, levels in changing:
             rows[:, number // 8] |= levels << (number % 8)
         yield rows.tobytes()
+
+
+def _members(signals: Signals, samplerate: int, samples: int) -> Iterator[tuple[int, int]]:
+    """First sample and number of samples of each member: few enough, with few enough pulses."""
+    first = 0
+    for _, end in signals.windows(WINDOW):
+        behind = min(-(-end * samplerate // SECOND), samples)  # the first sample that shows nothing of this window only
+        while first < behind:
+            count = min(CHUNK, behind - first)
+            yield first, count
+            first += count
+    if first < samples:
+        yield first, samples - first
 
 
 class _Sampler:

@@ -21,8 +21,10 @@ BLOCK = 1 << 20  # pulses made at a time
 def write(path: Path, signals: Signals, frequency: int, error: Error) -> None:
     """Write the file, whole or not at all, in ticks of `frequency` Hz, every pulse within `error`.
 
-    ValueError where the clock is too slow to keep two pulses apart, OSError if it cannot be written.
+    ValueError where the clock is too slow to keep two pulses apart, and for more pulses than can be written; OSError if
+    it cannot be.
     """
+    signals.pulse_count()
     scale = Scale(frequency)
     with open_whole(path) as file:
         rows = csv.writer(codecs.getwriter("utf-8")(file), lineterminator="\n")

@@ -37,7 +37,11 @@ class _Rows(NamedTuple):
 
 
 def write(path: Path, signals: Signals, watch: Watch = nobody_looks) -> None:
-    """Write the file, whole or not at all. `watch` is told how far it is. OSError if it cannot be written."""
+    """Write the file, whole or not at all. `watch` is told how far it is.
+
+    ValueError for more pulses than can be written; OSError if it cannot be.
+    """
+    signals.pulse_count()
     with open_whole(path) as file:
         for piece in pieces(signals, watch):
             file.write(piece)
@@ -55,7 +59,8 @@ def size(signals: Signals) -> int:
 
 
 def pieces(signals: Signals, watch: Watch = nobody_looks) -> Iterator[bytes]:
-    """The file in pieces, in order."""
+    """The file in pieces, in order. ValueError for more pulses than can be written."""
+    signals.pulse_count()
     dump = _Dump(signals)
     yield dump.header()
     now = 0

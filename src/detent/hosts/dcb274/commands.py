@@ -13,7 +13,7 @@ from detent.hosts.dcb274.handshake import SingleMode
 from detent.hosts.dcb274.ranges import LARGEST_ADDRESS, MOST_STEPS, between, place, program_address, sign, speed
 from detent.hosts.dcb274.unit import CLEARING, SAVING, Unit
 from detent.hosts.errors import BadAnswer
-from detent.hosts.exchange import Ask, Rest, Steps, attempt, operation
+from detent.hosts.exchange import Ask, Rest, Steps, operation
 
 CELLS_AT_ONCE: Final = 32  # bytes of one [: the answer fits into the buffer of a SIN-10
 READ_BACK: Final = 128  # the flag of l that reads, and with 1 of A
@@ -326,18 +326,14 @@ class Commands(Unit):
         if isinstance(self._way, SingleMode):
             yield from self._stop_alone(self._way)
             return
-        if not self._connected:
-            yield from self.connect()
-        if self._storing or self.programming:
+        if self._connected and (self._storing or self.programming):
             yield from self._leave_program_mode()
-        yield from self._way.interrupt(letter.encode())
+        yield from self._way.interrupt(letter.encode(), known=self._connected)
 
     def _stop_alone(self, way: SingleMode) -> Steps[None]:
-        if not self._connected and not self._broken:
-            yield from attempt(self.connect())
         known = self._connected and not self._storing and not self.programming
         try:
-            yield from way.soft_stop(known=known)
+            yield from way.soft_stop(known=known, signed_on=self._connected or self._broken)
         except GeneratorExit:
             self._connected, self._broken = False, True
             raise

@@ -9,7 +9,7 @@ before the line is complete: the line is taken back and entered again, so nobody
 import re
 from typing import Final
 
-from detent.hosts.errors import ECHOES, BadAnswer, NoAnswer, Refused, Spoken
+from detent.hosts.errors import ECHOES, BadAnswer, DriverError, NoAnswer, Refused, Spoken
 from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps, attempt, length, until
 
 BS, LF, CR, SPACE, ESC = b"\x08", b"\n", b"\r", b" ", b"\x1b"
@@ -22,6 +22,8 @@ ADAPTERS_OWN: Final = ";&*"  # mean something to a SIN-10: no names behind one
 SPOIL: Final = b"`" * (NAMED_LONGEST + 1)  # no name, no command, and longer than a line may be
 TRIES: Final = 3  # to enter a line
 STOP_TRIES: Final = 20  # to give the stop command: a unit that ramps down out of a program takes no line meanwhile
+BABBLES: Final = 6  # times the patience: so long it is tried where something else comes, too, as no unit ramps down so
+SPACING: Final = 0.02  # seconds between characters of a stop whose echo is not known
 STORED: Final = 0.5  # seconds in which the end of a program is written
 RESTART: Final = 0.1  # seconds that a unit may take from ^C or ^P until it listens
 SCAN: Final = 10.0  # seconds for `&`: 86 names, each with a time-out of the adapter's own
@@ -68,10 +70,11 @@ class Handshake(Driver):
         raise NotImplementedError
         yield
 
-    def interrupt(self, character: bytes) -> Steps[None]:
-        """Send ``@``, or on a line with names ``|``, to a unit that takes no line: a program runs (page 28).
+    def interrupt(self, character: bytes, *, known: bool) -> Steps[None]:
+        """Send ``@`` or ``|``, where lines have names: also a unit that runs a program takes it (page 28).
 
-        Where lines have names it is a line like any other for the unit that runs nothing, and means the same.
+        For the unit that runs nothing it is a line like any other, and means the same. It is on the line before
+        anything is waited for that may not come. `known`: no part of another line stands before it.
         """
         raise NotImplementedError
         yield
@@ -190,31 +193,32 @@ class SingleMode(Handshake):
             )
         raise BadAnswer(self.title, f"did not echo {text!r} as it is; the line was taken back", spoken)
 
-    def interrupt(self, character: bytes) -> Steps[None]:
-        """``@`` alone, which is not echoed; an echo says that no program runs, and makes it a command."""
-        answer = yield Ask(character, length(1), self.patience)
-        if answer.data == character:
-            yield Ask(CR, until(b"\r\n"), self.patience)
-        else:
-            self._print(answer.data)
-
-    def soft_stop(self, *, known: bool) -> Steps[None]:
+    def soft_stop(self, *, known: bool, signed_on: bool) -> Steps[None]:
         """``@`` until the unit has taken it and takes lines again. Raises NoAnswer, BadAnswer.
 
         ``@`` is not echoed and acts at once where a program runs, a command waits, or a hand jogs (pages 28 and 33); it
         is echoed, and is a line of its own, where lines are taken. `known`: the line is empty, and no program mode is
         on. Otherwise an ``@`` that is echoed stands behind something: it is taken back with all of that, and it is seen
-        whether lines are stored. SPACE would not do: a unit with a command that waits does not answer it.
+        whether lines are stored. SPACE would not do: a unit with a command that waits does not answer it. Without it
+        `signed_on` a unit may wait for just that, which is seen behind the first ``@``.
+
+        A unit that ramps down says nothing. So where other things come again and again the line babbles: that is told
+        soon, and a silence only when it is longer than a ramp.
         """
-        heard, wrong, late = b"", 0, 0.0
+        heard, wrong, others, began = b"", 0, 0, None
         for _ in range(STOP_TRIES):
             yield Clear()
             answer = yield Ask(b"@", until(b"@"), self.patience)
-            late = late or answer.at + STOP_TRIES * self.patience
-            if answer.at > late:
+            began = answer.at if began is None else began
+            if others > TRIES or answer.at > began + (BABBLES if others or wrong else STOP_TRIES) * self.patience:
                 break
             if not answer.whole:
-                self._print(answer.data.replace(b"#\r\n", b""))
+                heard = answer.data.replace(b"#\r\n", b"")
+                others += bool(heard)
+                self._print(heard)
+                if not signed_on:
+                    yield from self.signs_on()
+                    signed_on = True
                 continue
             if not known:
                 yield from self._erase(SINGLE_LONGEST + 1)
@@ -222,7 +226,7 @@ class SingleMode(Handshake):
                 yield Clear()
                 answer = yield Ask(b"@", length(1), self.patience)
                 if answer.data != b"@":
-                    wrong += 1
+                    heard, wrong = answer.data, wrong + 1
                     continue
             answer = yield Ask(CR, until(b"\r\n"), self.patience)
             if answer.data == b"\r\n":
@@ -231,9 +235,13 @@ class SingleMode(Handshake):
                 raise BadAnswer(self.title, ECHOES, Spoken(b"@\r", b"@\r"))
             heard, known, wrong = answer.data, False, wrong + 1
             if wrong >= TRIES:
-                raise BadAnswer(self.title, "answers its stop command with something else", Spoken(b"@\r", heard))
+                break
+        spoken = Spoken(b"@\r", heard)
+        if others or wrong:
+            what = "answers its stop command with something else; it was told to stop, and may still move"
+            raise BadAnswer(self.title, what, spoken, "abort() sends ESC")
         what = "does not take its stop command: it is off, or the line is broken"
-        raise NoAnswer(self.title, what, Spoken(b"@", heard), "abort() sends ESC")
+        raise NoAnswer(self.title, what, spoken, "abort() sends ESC")
 
     def _end_program_mode(self) -> Steps[None]:
         """P, if X is refused: lines are stored then (page 47). An empty line is taken."""
@@ -359,9 +367,24 @@ class PartyLine(Handshake):
             raise NotListening(self.title, "takes no line: a program runs, it jogs, or it is not there", spoken)
         raise BadAnswer(self.title, f"did not echo {entered!r} as it is; the line was spoilt", spoken)
 
-    def interrupt(self, character: bytes) -> Steps[None]:
-        """Name and character, each echoed, and LF; before that may come the end of a command that waited."""
-        yield from self.enter(character.decode("latin-1"))
+    def interrupt(self, character: bytes, *, known: bool) -> Steps[None]:
+        """Name and character, each echoed, and LF; before that may come the end of a command that waited.
+
+        The first time all of it is said, whatever comes back: who hears it stops, though we may not hear that.
+        """
+        yield Clear()
+        if not known:
+            yield Ask(SPOIL + LF)
+            yield Pause(SPACING)
+            yield Clear()
+        entered, echo = (self.name.encode("latin-1") + character), b""
+        for count in range(len(entered)):
+            patience = self.patience if echo == entered[:count] else SPACING
+            echo += (yield Ask(entered[count : count + 1], length(1), patience)).data
+        if echo != entered:
+            yield Ask(LF)
+            yield Pause(SPACING)
+            yield from self.enter(character.decode("latin-1"), TRIES - 1)
         ended = yield from self.ask(LF, until(b"\n"), self.patience)
         if ended.startswith(b"#"):
             yield from self.ask(b"", until(b"\n"), self.patience)
@@ -394,14 +417,17 @@ class DaisyChain(PartyLine):
 
     def connect(self) -> Steps[str]:
         """Give names if nobody has done so since the last reset, then ask the axis how it moves."""
-        yield Clear()
-        passed = yield Ask(LF, until(b"\n"), self.patience)
-        if not passed.whole:
-            yield from self.assign()
+        yield from self._have_names()
         if not (yield from self.line("^", 0.0)):
             what = f"is not in the chain, whose first axis is {self.first}"
             raise NoAnswer(self.title, what, Spoken(self.name.encode() + b"^\n", self.name.encode() + b"^\n"))
         return ""
+
+    def _have_names(self) -> Steps[None]:
+        yield Clear()
+        passed = yield Ask(LF, until(b"\n"), self.patience)
+        if not passed.whole:
+            yield from self.assign()
 
     def assign(self) -> Steps[tuple[str, ...]]:
         """LF and the first name, to axes that have none (page 24); the names that were given."""
@@ -420,6 +446,15 @@ class DaisyChain(PartyLine):
                 raise BadAnswer("the daisy chain", what, Spoken(sent, answer.data))
         self.names = tuple(names)
         return self.names
+
+    def interrupt(self, character: bytes, *, known: bool) -> Steps[None]:
+        """As on a party line. Names come first: without one an axis takes the first character for its own."""
+        missing = None if known else (yield from attempt(self._have_names()))
+        told = yield from attempt(super().interrupt(character, known=True))
+        if isinstance(missing, DriverError) and isinstance(told, DriverError):
+            raise missing
+        if isinstance(told, DriverError):
+            raise told
 
     def escape(self) -> Steps[None]:
         """ESC goes round, and every axis answers it."""
@@ -505,9 +540,17 @@ class Adapter(Handshake):
         replies = yield from self.ask(data, complete, self.patience * (1 + count) + seconds)
         return replies.decode("latin-1").split("\r\n")[:-1]
 
-    def interrupt(self, character: bytes) -> Steps[None]:
-        """A command like any other for the adapter: the unit echoes name and character while it runs."""
-        yield from self.line(character.decode("latin-1"), 0.0)
+    def interrupt(self, character: bytes, *, known: bool) -> Steps[None]:
+        """A command like any other for the adapter: the unit echoes name and character while it runs.
+
+        An adapter that knows no such axis looks for axes first, which resets them (page 19).
+        """
+        refused = yield from attempt(self.line(character.decode("latin-1"), 0.0))
+        if isinstance(refused, Refused) and not known:
+            yield from self.connect()
+            yield from self.line(character.decode("latin-1"), 0.0)
+        elif isinstance(refused, DriverError):
+            raise refused
 
     def over(self) -> Steps[bool]:
         """Whether it says how it moves."""

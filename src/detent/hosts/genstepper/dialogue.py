@@ -76,6 +76,11 @@ class Dialogue(Axis):
         (action,) = yield from self.ask(commands, ACTION, again=again)
         return Action(action)
 
+    def at_once(self, commands: str) -> Steps[None]:
+        """Say `commands` to the motor before old answers are waited for. They are to be said again behind that."""
+        if self._stale:
+            yield Ask(f"{self.motor}{commands}".encode("ascii"))
+
     def exchange(
         self, text: str, wanted: re.Pattern[bytes], *, again: bool = False, more: float = 0.0
     ) -> Steps[re.Match[bytes]]:

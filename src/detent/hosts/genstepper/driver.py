@@ -97,6 +97,7 @@ class GenStepper(Commands):
     def stop(self) -> Steps[None]:
         """Z: ramp down to the stop rate and stand. Nothing happens if the motor stands already."""
         self._begin()
+        yield from self.at_once("Z")
         yield from self.order("Z")
 
     @operation
@@ -106,9 +107,10 @@ class GenStepper(Commands):
         Z first: K alone would end the stop in which a motor reverses, and let it start the other way at full rate.
         """
         self._begin()
+        yield from self.at_once("Z")
         keep = self._keep
         if keep is None:
-            keep = yield from self.report(STOP_RATE)
+            (keep,) = yield from self.ask("Z", STOP_RATE)
         self._keep = None
         try:
             yield from self.order(f"Z{NO_RAMP}K")
