@@ -213,11 +213,13 @@ def _print_real(console: "Console", real: dict[str, Any]) -> None:
     """How real pins stand."""
     rows = []
     for name, axis in real["axes"].items():
-        standing = axis["standing"] if not axis["why"] else f"{axis['standing']}: {axis['why']}"
-        rows.append([name, standing, axis["shaft"], "" if axis["known"] else "not known", axis["stops"], axis["slips"],
+        rows.append([name, axis["standing"], axis["shaft"], "" if axis["known"] else "not known", axis["stops"], axis["slips"],
                      f"{axis['lead'] / 1e6:g} ms", f"{axis['lag'] / 1e6:.3g} ms", _listed(axis["armed"])])  # fmt: skip
     columns = ["axis", "standing", "steps", "motor", "stops", "slips", "lead", "lag", "stopped by"]
     console.print(_table("real pins", columns, rows))
+    for name, axis in real["axes"].items():
+        if axis["why"]:
+            console.print(f"{name} stands: {axis['why']}", markup=False)
     boards = ([name, b["state"], b["firmware"], b["frequency"], b["move_count"]] for name, b in real["boards"].items())
     console.print(_table("boards", ["board", "state", "firmware", "ticks/s", "queue"], boards))
     if real.get("waits_for"):

@@ -252,10 +252,10 @@ def fed_too_late(raw: Raw) -> None:
 
 
 def fed_in_time(raw: Raw) -> None:
-    raw.configure(out(raw, 100))
+    raw.configure(out(raw, 600))
     for _ in range(4):
         raw.say("queue_digital_out", oid=0, clock=raw.now() + raw.ms(20), on_ticks=1)
-        raw.wait(60)
+        raw.wait(250)
     raw.say("queue_digital_out", oid=0, clock=raw.now() + raw.ms(20), on_ticks=0)
     raw.wait(200)
 
@@ -373,15 +373,17 @@ RULES: dict[Callable[[Raw], None], Any] = {
 
 def prove(rule: Callable[[Raw], None], terminal: str) -> None:
     raw = Raw(terminal)
-    rule(raw)
-    raw.wait(30)
+    try:
+        rule(raw)
+        raw.wait(30)
+    finally:
+        raw.port.close()
     wanted = RULES[rule]
     found = raw.answers()
     if isinstance(wanted, str):
         assert found[0] == ("shutdown", {"static_string_id": wanted})
     else:
         assert found == wanted
-    raw.port.close()
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
