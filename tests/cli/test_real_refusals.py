@@ -52,6 +52,17 @@ def aliased(_: FakeBoard) -> FakePort:
     return FakePort(FakeBoard(moves=400, pins={"chip0/gpio0": (0, 64), "gpio0": (0, 64)}))
 
 
+def unfit(*pins: str) -> Callable[[FakeBoard], FakePort]:
+    """Pins that the board has, and that cannot do what they are for: only the firmware knows."""
+
+    def port(_: FakeBoard) -> FakePort:
+        board = FakeBoard(moves=400, unfit=pins)
+        board.chips = Chips()
+        return FakePort(board)
+
+    return port
+
+
 CASES: dict[str, tuple[Change, Callable[[FakeBoard], FakePort], str, str]] = {
     # what is wrong: what is different in the cell file, or on the board; the key; what the line says
     "no board": (("fake:", "/dev/serial/by-id/usb-Klipper_x"), FakePort, "boards.b.serial",
@@ -63,6 +74,14 @@ CASES: dict[str, tuple[Change, Callable[[FakeBoard], FakePort], str, str]] = {
     "a firmware too old for a chip": (SAME, old("config_tmcuart", "tmcuart_send"), "boards.b.serial", "config_tmcuart"),
     "a pin that the board has not": (("gpio6", "gpio99"), FakePort, "hardware.x.outputs.MOV", "gpio99"),
     "a pin that the board needs itself": (("gpio6", "gpio1"), FakePort, "hardware.x.outputs.MOV", "gpio1"),
+    "an output on a pin that is none": (SAME, unfit("gpio6"), "hardware.x.outputs.MOV: the firmware does not take",
+                                        "take another pin"),
+    "an input on a pin that is none": (SAME, unfit("gpio11"), "hardware.x.inputs.HOME: the firmware does not take",
+                                       "take another pin"),
+    "steps on a pin that is none": (SAME, unfit("gpio2"), "hardware.x: the firmware does not take gpio2 and gpio3",
+                                    "take another pin"),
+    "a chip on a pin that is none": (SAME, unfit("gpio20"), "hardware.x.driver.uart: the firmware does not take gpio20",
+                                     "take another pin"),
     "a pin used twice": (("gpio6", "gpio10"), FakePort, "hardware.x.inputs.EOT",
                          "pin gpio10 of b is hardware.x.outputs.MOV already: take another"),
     "a pin used under two names": (("gpio6", "chip0/gpio3"), aliased, "hardware.x.outputs.MOV",

@@ -129,6 +129,23 @@ def test_a_host_that_comes_in_mid_move_finds_it_at_rest() -> None:
     assert not after.of(CountDiffers)
 
 
+@pytest.mark.parametrize("gone", range(0, 2400, 100))
+def test_a_host_may_come_while_the_watchdog_of_another_runs_out(gone: int) -> None:
+    """Started again by a service manager, say: whenever that is, the board is taken as it is found."""
+    made = moving()
+    for _ in range(gone // 10):  # nobody is there
+        made.ports[0].run_to(made.wall)
+        made.wall += 10 * MS
+    after = Bench([(setup(), FakePort(made.board))])
+    assert not after.of(Refusal)
+    assert not after.of(Ready)[0].restarted
+    after.boards.steppers["slide"].adopt(0)
+    here = made.machine.axes["slide"].position
+    after.move(constant_acceleration.move(200, 1500, 60, 200).train, -1)
+    after.rest()
+    assert made.machine.axes["slide"].position == here - 200
+
+
 def test_an_unplugged_board_is_found_again_with_its_position() -> None:
     made = moving()
     made.ports[0].unplugged = True

@@ -4,7 +4,7 @@ A board is told what it received and what the wall clock says, and gives bytes t
 `Ready` or `Refusal` is the first event. See `several.Boards` for what a cell uses.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
 from functools import partial
 
@@ -18,7 +18,7 @@ from detent.realtime.boards.frames import ROOM, FrameError
 from detent.realtime.boards.outs import DigitalOut
 from detent.realtime.boards.probes import Probes
 from detent.realtime.boards.setup import BoardSetup
-from detent.realtime.boards.vocabulary import unsuited
+from detent.realtime.boards.vocabulary import owner, unsuited
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, SECOND, Ns
 
@@ -74,6 +74,8 @@ class Board:
         self._begin_at: WallNs = 0
         self._wait_until: WallNs | None = None
         self._identity = bytearray()
+        self._setting: Iterator[frozenset[str]] | None = None  # its configuration, as far as it has yet to be sent
+        self._pins_set: frozenset[str] = frozenset()  # what the last command of it was about
 
     # -- what is known of it
 
@@ -127,7 +129,7 @@ class Board:
         self.state = State.CONNECTING
         self._identity.clear()
         self._begin_at = wall
-        self._wait_until = None
+        self._wait_until = self._setting = None
         self._probes.clear()
         self.wants_reopening = False
         core.link.sync(wall)
@@ -155,6 +157,7 @@ class Board:
         if core.link.synced and not was:
             core.dictionary = BARE
             self._ask_identity(wall)
+        self._configure(wall)
         core.link.flush(wall)
 
     def deadline(self) -> WallNs | None:
@@ -305,8 +308,18 @@ class Board:
             self._start_again(bool(is_shutdown))
             return
         self._fresh = True
-        self._equipment.configure()
-        self._ask_config(wall)
+        self._setting = self._equipment.configure()
+        self._configure(wall)
+
+    def _configure(self, wall: WallNs) -> None:
+        """Configure it, a command at a time: so it is known which of them it does not take."""
+        while self._setting is not None and self.core.link.idle:
+            pins = next(self._setting, None)
+            if pins is None:
+                self._setting = None
+                self._ask_config(wall)
+            else:
+                self._pins_set = pins
 
     def _fresh_if_waiting(self, wall: WallNs) -> None:
         if self._wait_until is not None and self._wait_until <= wall:
@@ -417,7 +430,7 @@ class Board:
 
     def _refuse(self, item: str, key: str, text: str, *, passing: bool = False) -> None:
         self.state = State.REFUSED
-        self.reason = text
+        self.reason, self._setting = text, None
         self.core.forget_questions()
         self.core.events.append(Refusal(self.name, item, key, text, passing))
 
@@ -425,7 +438,7 @@ class Board:
         self.state = state
         self.core.forget_questions()
         self._recovering = False
-        self._wait_until = None
+        self._wait_until = self._setting = None
         self._equipment.fall()
         self.core.queue.clear(self.core.queue.size)
 
@@ -436,11 +449,13 @@ class Board:
             if message.name == "shutdown" and "reset" not in self.core.dictionary.commands:
                 self.core.command("config_reset")
             return
-        if self.state is State.CONFIGURING and not self._recovering:
-            remedy = "perhaps a pin of this board cannot do what [hardware] uses it for: take another"
-            self._refuse("", "", f"the firmware does not take this configuration ({reason}): {remedy}")
+        if self.state is State.CONFIGURING and self._setting is not None:
+            pins = " and ".join(sorted(self._pins_set))
+            what = f"the firmware does not take {pins or 'this configuration'} ({reason})"
+            remedy = "take another pin, that can do this on this board" if pins else "switch the board off and on"
+            self._refuse(*owner(self.setup, self._pins_set), f"{what}: {remedy}")
         elif self.state is State.CONFIGURING and message.name == "shutdown":
-            # a watchdog that nobody has fed since it was lost: it is taken from there, as if it had been found so
+            # a watchdog that nobody has fed since a host was lost: it is taken from there, as if it had been found so
             self.core.forget_questions()
             self._wait_until = None
             self._ask_config(wall)

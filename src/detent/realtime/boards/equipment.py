@@ -89,10 +89,11 @@ class Equipment:
         """By which a configuration is known again, of this firmware."""
         return zlib.crc32(json.dumps([self._core.dictionary.version, self.config()]).encode())
 
-    def configure(self) -> None:
-        """Send the configuration."""
+    def configure(self) -> Iterator[frozenset[str]]:
+        """Send the configuration, a command whenever it is asked for the next: the pins which that is about."""
         for name, values in self.config():
             self._core.command(name, **self._numbered(values))
+            yield frozenset(v for key, v in values.items() if isinstance(v, str) and key != "spi_bus")
         self._core.command("finalize_config", crc=self.crc())
 
     def _numbered(self, values: Mapping[str, Value | str]) -> dict[str, Value]:

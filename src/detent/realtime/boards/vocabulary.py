@@ -3,7 +3,7 @@
 Fields are found by their names in the dictionary of the firmware itself, whose numbers differ from build to build.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from typing import TypeAlias
 
 from detent.realtime.boards.dictionary import Dictionary
@@ -111,6 +111,15 @@ def unsuited(setup: BoardSetup, found: Dictionary) -> tuple[str, str, str] | Non
             what = f"{out.watchdog / SECOND:g} s is more than its clock can count; take {most} s or less"
             return out.name, "watchdog", what
     return None
+
+
+def owner(setup: BoardSetup, pins: Set[str]) -> tuple[str, str]:
+    """The item to which those pins belong, and the key; "" where there is more than one of them, or none."""
+    found = [(item, key) for item, key, name in _all_pins(setup) if name in pins]
+    items, keys = {item for item, _ in found}, {key for _, key in found}
+    if len(items) != 1:
+        return "", ""
+    return items.pop(), keys.pop() if len(keys) == 1 else ""
 
 
 def _all_pins(setup: BoardSetup) -> list[tuple[str, str, str]]:

@@ -27,10 +27,11 @@ class FakeBoard:
         self, machine: Machine | None = None, *, seed: int = 1, frequency: int = 16_000_000, moves: int = 64,
         pins: int | Mapping[str, tuple[int, int]] = 64, window: int | None = 192,
         first_tick: int = (1 << 32) - 50_000_000, sequence: int = 9, leave_out: tuple[str, ...] = (),
-        reset: str = "reset", version: str = "fake-1", reserved: Mapping[str, str] = TAKEN,
+        reset: str = "reset", version: str = "fake-1", reserved: Mapping[str, str] = TAKEN, unfit: tuple[str, ...] = (),
     ) -> None:  # fmt: skip
         self.machine = machine if machine is not None else Machine()
         self.frequency, self.moves_allowed, self.window = frequency, moves, window
+        self._unfit = unfit  # pins that are there and can do nothing
         self.now = first_tick
         self.sent: list[tuple[int, bytes]] = []
         self.log: list[tuple[int, str, Mapping[str, Value]]] = []  # commands that were carried out
@@ -200,7 +201,7 @@ class FakeBoard:
     def pin(self, number: Value) -> str:
         """The name of a pin. Shutdown for one that is not there."""
         assert isinstance(number, int)
-        if number not in self._pins:
+        if number not in self._pins or self._pins[number] in self._unfit:
             raise Shutdown("Not an output pin")
         return self._pins[number]
 
