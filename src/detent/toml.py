@@ -18,6 +18,9 @@ _LONG_KEY: Final = re.compile(
 )
 
 
+_LONG_NUMBER: Final = re.compile(r"[0-9](?:_?[0-9]){4000}")
+
+
 class NoToml(ValueError):
     """A text that is no TOML, or none that is meant here. It says why."""
 
@@ -34,4 +37,8 @@ def loads(text: str) -> dict[str, Any]:
     except RecursionError:
         raise NoToml("its tables and lists are nested too deeply: no key that is meant here is") from None
     except ValueError:  # an integer of more digits than Python reads
-        raise NoToml("it has a number of thousands of digits: no number that is meant here is so long") from None
+        found = _LONG_NUMBER.search(text)
+        place = f" (at line {text.count(chr(10), 0, found.start()) + 1})" if found else ""
+        raise NoToml(
+            f"it has a number of thousands of digits{place}: no number that is meant here is so long"
+        ) from None

@@ -1,10 +1,15 @@
 """What cannot be built: each fault is told with the file, the key and what to do."""
 
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
 import pytest
 from tests.cell.cells import cell
 
 from detent.cell.build import build
 from detent.cell.description import Problem, parse, single
+from detent.ticks import MS
 
 ONE = '[units.bar]\nmodel = "gs-c200"\n'
 TWO = ONE + '[units.drill]\nmodel = "gs-c200s"\n'
@@ -250,3 +255,57 @@ def test_a_motor_of_ones_own_is_as_good_as_a_named_one(data: str, steps: int) ->
 def test_a_named_motor_may_have_other_steps() -> None:
     made = cell(ONE + MOTOR + "data = { steps = 400 }", FILES)
     assert made.parts[made.wiring.names.index("m")].rig.motor.steps == 400  # type: ignore[attr-defined]
+
+
+# -- any value of any key ------------------------------------------------------------------------------------------
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+VALUE = re.compile(r"""=[ \t]*("[^"\n]*"|'[^'\n]*'|-?[\d.][\w.+-]*|true|false)""")
+STRANGE = ("-1", "0", "nan", "inf", "1e15", "-1e15", "1e-300", "99999999999", '""', "true", "[]", "{}", "0.5", '"x"',
+           '"1e15 s"', '"0 s"', "-0.0", "1979-05-27", "9" * 5000)  # fmt: skip
+
+
+def strange_cells() -> Iterator[tuple[Path, str]]:
+    """The cells of the examples with one value of one key replaced by another."""
+    for path in sorted(EXAMPLES.glob("*/*.toml")):
+        text = path.read_text("utf-8")
+        for found in VALUE.finditer(text):
+            for value in STRANGE:
+                yield path, text[: found.start(1)] + value + text[found.end(1) :]
+
+
+def built_or_refused(path: Path, text: str) -> None:
+    try:
+        build(parse(text, path.name), lambda name: (path.parent / name).read_text("utf-8"), record=False).run_to(MS)
+    except Problem as problem:
+        told = str(problem)
+    else:
+        return
+    assert told.startswith(f"{path.name}: ")
+    assert "\n" not in told
+
+
+def test_any_value_of_any_key_is_taken_or_refused_in_a_line() -> None:
+    cells = list(strange_cells())
+    assert len(cells) > 3000
+    for path, text in cells[::7]:
+        built_or_refused(path, text)
+
+
+@pytest.mark.slow
+def test_all_of_them_are() -> None:
+    for path, text in strange_cells():
+        built_or_refused(path, text)
+
+
+def test_a_motor_of_a_chopper_with_a_supply_that_is_none_is_refused() -> None:
+    text = ONE + '[motors.m]\nmotor = "qsh4218-41-10-035"\naxis = "bar"\nsupply = -1\n'
+    with pytest.raises(Problem, match=r"motors\.m: drive: supply is -1: give a number greater than 0"):
+        build(parse(text, "cell.toml"), str)
+    with pytest.raises(Problem, match=r"units\.w\.options: .*brake is at least 8 us"):
+        build(parse('[units.w]\nmodel = "damping"\noptions = { brake = 0 }\n', "cell.toml"), str)
+
+
+def test_a_number_of_thousands_of_digits_is_told_with_its_line() -> None:
+    with pytest.raises(Problem, match=r"a number of thousands of digits \(at line 3\)"):
+        parse(ONE + f"shaft = {'9' * 5000}\n", "cell.toml")

@@ -29,7 +29,8 @@ BASE = {
 }  # fmt: skip
 
 WORDS = [
-    "", "nan", "inf", "-inf", "-1", "0", "1e999", "99999999999999999999999", "x" * 400, "\u00e9", "\u2603", "\x01",
+    "", "nan", "inf", "-inf", "-1", "0", "1e999", "99999999999999999999999", "x" * 400, "x" * 5000,
+    "9" * 5000, "1," * 3000, "\u00e9", "\u2603", "\x01",
     "\x1b[2J", "folder", "/dev/null", "/dev/zero", "missing", "missing/x", "binary.toml", "=", "a=b=c", "=5", "a=", ":",
     ":::", "127.0.0.1:99999", "host:port", "[::1]:x", "rfc2217://", "--", "-", "1/0", "0x10", "1_000", "\u0663", "\n",
     "a\nb", "\udcff", "../../x", "cell.toml", "p.gsc", "p.img", "gs-c200", "dcb-274", "0-0=0", "1-2=-5", "S=", "S=nan",
@@ -123,6 +124,30 @@ def judged(words: list[str], how: Ended) -> str:
     if how.code in (1, 2) and re.search(r"[\x00-\x08\x0b-\x1f\x7f]", how.errors):
         return "steers the terminal"
     return ""
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["run gs-c200 --send @", "run @", "wiring @", "motor qsh4218-41-10-035 --move 100 --seed @", "size bs0610 x=@",
+     "motor qsh4218-41-10-035 --as supersigma table=@ --move 100", "run gs-c200 --sr a.sr --sr-rate @",
+     "run gs-c200 --for @", "run supersigma --set table=@", "@", "table @", "models @"],
+)  # fmt: skip
+def test_an_error_quotes_no_more_than_a_line_holds(line: str, tmp_path: Path) -> None:
+    for word in ("9" * 5000, "x" * 5000, "1," * 3000):
+        words = [one.replace("@", word) for one in line.split()]
+        how = ended(words, tmp_path, 60)
+        assert how.code in (1, 2)
+        assert not judged(words, how), how.errors[:200]
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["table sine --duration 1000000h", "table sine --interval 500ns --duration 1h", "table linear --duration 8766h"],
+)
+def test_a_table_of_a_curve_that_takes_very_long_is_refused_at_once(line: str, tmp_path: Path) -> None:
+    how = ended(line.split(), tmp_path, 20)
+    assert how.code == 2
+    assert "make it shorter or the interval longer" in how.errors
 
 
 @pytest.mark.slow

@@ -119,10 +119,13 @@ class _Builder:
                 keywords = catalogue.option_values(found, unit.options)
             except CatalogueError as error:
                 raise self.problem(f"{key}.options", str(error)) from None
-            if isinstance(found, Model):
-                device: Device = found.make(straps[name], line_timing=line_timing, shaft=unit.shaft, **keywords)
-            else:
-                device = found.make(**keywords, **({"line_timing": line_timing} if found.adapter else {}))
+            try:
+                if isinstance(found, Model):
+                    device: Device = found.make(straps[name], line_timing=line_timing, shaft=unit.shaft, **keywords)
+                else:
+                    device = found.make(**keywords, **({"line_timing": line_timing} if found.adapter else {}))
+            except ValueError as error:  # each option is one, and together they make no unit
+                raise self.problem(f"{key}.options", str(error)) from None
             self.names.append(name)
             self.parts.append(device)
 
@@ -142,9 +145,10 @@ class _Builder:
     def check_motor_supply(self, name: str, entry: "Motor") -> None:
         """A motor on the power stage of a controller has a supply that this one stands."""
         found = self.models.get(entry.unit or "")
-        low, high = found.limits.motor_supply if isinstance(found, Model) else NO_LIMITS.motor_supply
+        if not isinstance(found, Model):
+            return  # what any drive stands is its own to say
+        low, high = found.limits.motor_supply
         if not low <= entry.supply <= high:
-            assert found is not None
             what = f"{entry.supply:g} V: the motors of a {found.name} have {low:g} to {high:g} V"
             raise self.problem(f"motors.{name}.supply", what)
 

@@ -4,12 +4,17 @@ import sys
 from typing import NoReturn
 
 from detent.cli.codes import ASKED_WRONGLY, FAILED
+from detent.one_line import MOST, one_line
 
 
 def tell(text: object) -> None:
-    """Say something on stderr as every verb does; what would steer a terminal is written out."""
+    """Say something on stderr as every verb does; what would steer a terminal is written out.
+
+    A line that quotes very much loses its middle.
+    """
     shown = "".join(sign if sign.isprintable() or sign in "\n\t" else repr(sign)[1:-1] for sign in str(text))
-    print(f"detent: {shown}", file=sys.stderr, flush=True)
+    lines = (line if len(line) <= MOST else one_line(line) for line in shown.split("\n"))
+    print("detent: " + "\n".join(lines), file=sys.stderr, flush=True)
 
 
 def of_system(error: OSError) -> str:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from detent.realtime.cell_source import CellSource
     from detent.ticks import Ns
 
+FASTEST = 1_000_000_000  # samples a second
 LARGE = 20_000_000  # bytes; larger is told before it is begun
 
 
@@ -45,8 +46,9 @@ class ExportFiles(NamedTuple):
             from detent.outputs.figures import check
 
             check(self.plot)
-        if self.sr_rate is not None and (self.sr is None or self.sr_rate < 1):
-            raise ValueError(f"--sr-rate is for --sr, in samples a second, and at least 1, not {self.sr_rate}")
+        if self.sr_rate is not None and (self.sr is None or not 1 <= self.sr_rate <= FASTEST):
+            what = f"--sr-rate is for --sr, in samples a second, 1 to {FASTEST}"
+            raise ValueError(f"{what} (times are whole ns), not {self.sr_rate}")
         if self.frequency < 1:
             what = "a clock has 1 tick a second or more, like 12000000"
             raise ValueError(f"--steps-frequency {self.frequency}: {what}")

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from detent.cli.endings import tell
+
 if TYPE_CHECKING:
     from detent.cell.cell import Cell
     from detent.cell.conversation import Conversation, Exchange
@@ -255,4 +257,4 @@ def warn(told: Outcome) -> None:
 
 
 def _warn(text: str) -> None:
-    print(f"detent: {text}", file=sys.stderr)
+    tell(text)

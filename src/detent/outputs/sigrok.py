@@ -68,8 +68,6 @@ def write(
     samplerate that is too low for the edges of a channel, or too high for a run of this length; OSError if the file
     cannot be written.
     """
-    if samplerate < 1:
-        raise ValueError(f"a samplerate is at least 1 sample a second, not {samplerate}")
     chosen = channels(signals, names)
     samples = _samples(signals, samplerate, chosen)
     with open_whole(path) as file, ZipFile(file, "w", ZIP_DEFLATED) as archive:
@@ -84,6 +82,9 @@ def write(
 
 
 def _samples(signals: Signals, samplerate: int, chosen: Sequence[Channel]) -> int:
+    if not 1 <= samplerate <= SECOND:
+        what = f"at least 1 sample a second, and at most {SECOND}, as times are whole ns"
+        raise ValueError(f"a samplerate is {what}, not {samplerate}")
     samples, most = signals.until * samplerate // SECOND + 1, MOST_BYTES // _unitsize(chosen)
     if samples > most:
         fits = (most - 1) * SECOND // signals.until

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import accumulate, pairwise
+from itertools import accumulate, islice, pairwise
 from typing import Any
 
 from detent.ramps.rate_generator import CLOCK_HZ, CLOCK_NS
@@ -23,6 +23,7 @@ EPROM = 1024  # bytes of the 8748
 PROGRAM: dict[str, int] = {"command reception": 50, "ramp generation": 198, "additional features": 522}
 """Bytes of the drive's program beside the table (the paper's table 2)."""
 ROOM = EPROM - sum(PROGRAM.values())
+MOST_INSTANTS = 1 << 16  # of a curve that are looked at, to say where it does not fit
 
 Curve = Callable[[float], float]
 """Speed in half steps a second over time in seconds."""
@@ -98,7 +99,10 @@ def instants(duration: float, interval: int = INTERVAL) -> Iterator[float]:
 
 def compiled(curve: Curve, duration: float, interval: int = INTERVAL) -> Differences:
     """The table of `curve` from t = 0 to `duration` seconds. Raises CurveError with the place of the first fault."""
-    times = list(instants(duration, interval))
+    times = list(islice(instants(duration, interval), MOST_INSTANTS + 1))
+    if len(times) > MOST_INSTANTS:
+        raise CurveError(f"the curve lasts {duration:g} s, more than {MOST_INSTANTS} intervals of "
+                         f"{shown_interval(interval)}: make it shorter or the interval longer")  # fmt: skip
     if len(times) < 2:
         raise CurveError(f"the curve lasts {duration:g} s and the interval is {shown_interval(interval)}: "
                          "there is no difference; make the curve longer or the interval shorter")  # fmt: skip
