@@ -300,7 +300,7 @@ def test_all_of_them_are() -> None:
 
 def test_a_motor_of_a_chopper_with_a_supply_that_is_none_is_refused() -> None:
     text = ONE + '[motors.m]\nmotor = "qsh4218-41-10-035"\naxis = "bar"\nsupply = -1\n'
-    with pytest.raises(Problem, match=r"motors\.m: drive: supply is -1: give a number greater than 0"):
+    with pytest.raises(Problem, match=r"motors\.m: drive: supply is -1\.0: give a number greater than 0"):
         build(parse(text, "cell.toml"), str)
     with pytest.raises(Problem, match=r"units\.w\.options: .*brake is at least 8 us"):
         build(parse('[units.w]\nmodel = "damping"\noptions = { brake = 0 }\n', "cell.toml"), str)
