@@ -303,7 +303,7 @@ def test_a_motor_of_a_chopper_with_a_supply_that_is_none_is_refused() -> None:
     with pytest.raises(Problem, match=r"motors\.m: drive: supply is -1\.0: give a number greater than 0"):
         build(parse(text, "cell.toml"), str)
     with pytest.raises(Problem, match=r"units\.w\.options: .*brake is at least 8 us"):
-        build(parse('[units.w]\nmodel = "damping"\noptions = { brake = 0 }\n', "cell.toml"), str)
+        build(parse('[units.w]\nmodel = "phase-reversal"\noptions = { brake = 0 }\n', "cell.toml"), str)
 
 
 def test_a_number_of_thousands_of_digits_is_told_with_its_line() -> None:
