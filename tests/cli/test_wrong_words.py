@@ -150,6 +150,36 @@ def test_a_table_of_a_curve_that_takes_very_long_is_refused_at_once(line: str, t
     assert "make it shorter or the interval longer" in how.errors
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [("--port 99999", "--port 99999: a port is"), ("--port -1", "--port -1: a port is"), ("--pace 1e300", "--pace"),
+     ("--pace -1", "--pace"), ("--pace nan", "--pace"), (f"--memory {10**21}", "--memory"), ("--memory 5", "--memory")],
+)  # fmt: skip
+def test_a_number_that_no_workbench_takes_is_told_with_its_option(words: str, told: str, tmp_path: Path) -> None:
+    how = ended(["workbench", "gs-c200", *words.split()], tmp_path, 60)
+    assert how.code == 2
+    assert how.errors.startswith(f"detent: {told}")
+    assert not judged([], how)
+
+
+NUMBERS = ("-1", "0", "99999", "65536", "99999999999999999999999", "1e300", "1e-300", "nan")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", VERBS)
+def test_any_number_of_any_option_is_taken_or_refused(verb: str, tmp_path: Path) -> None:
+    (tmp_path / "cell.toml").write_text('[units.u]\nmodel = "gs-c200"\n')
+    (tmp_path / "p.gsc").write_text("+100\n")
+    (tmp_path / "p.img").write_bytes(b"\x2b\x00\x00\x64")
+    for argument in application(verb)[verb].assemble_argument_collection():
+        names = [name for name in argument.names if name.startswith("--")]
+        if names and re.search(r"\b(int|float)\b", str(argument.hint)):
+            for number in NUMBERS:
+                words = [verb, *BASE[verb].split(), names[0], number]
+                how = ended(words, tmp_path, 10)
+                assert not judged(words, how), (words, how)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("verb", VERBS)
 def test_no_wrong_word_ends_in_a_traceback(verb: str, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import gc
 import json as json_text
-import math
 import os
 import sys
 import time
@@ -96,6 +95,7 @@ def serve(
     from detent.realtime.endpoints.endpoint import EndpointError, EndpointLost
     from detent.realtime.images import Images, ImagesUnusable, default_folder
     from detent.realtime.notify import Notifier
+    from detent.realtime.pace import check_pace
     from detent.realtime.polling import allow_many
     from detent.realtime.service import Service, models
 
@@ -105,8 +105,10 @@ def serve(
     try:
         if target is None:
             raise Problem("", "", "say what to serve: a model like gs-c200 (detent models), or a CELL.toml")
-        if not (math.isfinite(pace) and pace > 0):
-            raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
+        try:
+            check_pace(pace)
+        except ValueError as error:
+            raise Problem("", "--pace", str(error)) from None
         endpoints = asked_endpoints(links, tcp, rfc2217, serial)
         control_at = None if control is None else asked_address("--control", control)
         if real and pace != 1:

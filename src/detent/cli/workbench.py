@@ -2,7 +2,6 @@
 
 import asyncio
 import json as json_text
-import math
 import os
 import sys
 import webbrowser
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from detent.workbench.client import Bench
 
 FIRST = Path("drilling", "bar-after-bar.toml")
+LEAST_MEMORY, MOST_MEMORY = 256, 1_000_000  # MB that the past may take
 
 
 def workbench(
@@ -109,6 +109,7 @@ def workbench(
     from detent.realtime.cell_source import find_cell
     from detent.realtime.examples import home
     from detent.realtime.images import ImagesUnusable, cell_name, default_folder
+    from detent.realtime.pace import check_pace
 
     links = list(pty) if pty is not None else None
     if target is None and links:  # `workbench --pty gs-c200`: what follows --pty was meant to be shown
@@ -118,12 +119,15 @@ def workbench(
     kept = state if state is not None else default_folder()
     try:
         need("workbench", "the workbench needs")
-        if not (math.isfinite(pace) and pace > 0):
-            raise Problem("", "--pace", f"{pace} is no pace; it takes a number above 0, 1 is real time")
+        try:
+            check_pace(pace)
+        except ValueError as error:
+            raise Problem("", "--pace", str(error)) from None
         if real and (pace != 1 or hold):
             raise Problem("", "--real", "real pins keep real time: leave out --pace and --hold")
-        if memory < 256:
-            raise Problem("", "--memory", f"{memory} MB are too few; it takes at least 256")
+        if not LEAST_MEMORY <= memory <= MOST_MEMORY:
+            what = f"{memory} MB are too {'few' if memory < LEAST_MEMORY else 'many'}"
+            raise Problem("", "--memory", f"{what}; it takes {LEAST_MEMORY} to {MOST_MEMORY}")
         endpoints = asked_endpoints(links, tcp, rfc2217, serial)
         control_at = None if control is None else asked_address("--control", control)
         find_cell(shown, straps=strap, options=set_)  # at once, not when everything is loaded

@@ -30,7 +30,7 @@ class Pace:
     """
 
     def __init__(self, factor: Fraction | float = 1, *, origin: Ns = 0, clock: Clock = time.monotonic_ns) -> None:
-        _check(factor)
+        check_pace(factor)
         self.clock = clock
         self.held = False
         self.free = False
@@ -61,7 +61,7 @@ class Pace:
     def change(self, factor: Fraction | float | None, now: Ns) -> None:
         """From the cell time `now` on it runs at `factor`; None: free. Raises ValueError."""
         if factor is not None:
-            _check(factor)
+            check_pace(factor)
             self._set(factor)
         self.free = factor is None
         self.restart(now)
@@ -83,9 +83,10 @@ class Pace:
         return self._began - (self._origin - at) * self._divide // self._multiply
 
 
-def _check(factor: Fraction | float) -> None:
+def check_pace(factor: Fraction | float) -> None:
+    """ValueError for what is no pace, or out of reach."""
     if not 0 < factor < math.inf:
-        raise ValueError(f"pace {factor} would not go forward; it takes a number above 0")
+        raise ValueError(f"{factor} is no pace; it takes a number above 0, 1 is real time")
     if not SLOWEST <= factor <= FASTEST:
         raise ValueError(
             f"pace {float(factor):g} is out of reach; it takes {float(SLOWEST):g} to {float(FASTEST):g}, 1 is real time"

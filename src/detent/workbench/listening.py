@@ -9,6 +9,7 @@ from typing import NamedTuple
 from detent.realtime.system import reuse_address
 
 USUAL = 8274  # the port without a word: a browser keeps what it remembers by address and port
+LAST_PORT = 65_535
 TRIED = 10  # ports from there on, before any that is free
 
 
@@ -48,7 +49,9 @@ def listen_as_usual(host: str, token: str | None) -> Listening:
 
 
 def listen(place: Place) -> Listening:
-    """Bind where the server shall listen. Raises OSError."""
+    """Bind where the server shall listen. Raises OSError, and ValueError for a port that is none."""
+    if not 0 <= place.port <= LAST_PORT:
+        raise ValueError(f"--port {place.port}: a port is 1 to {LAST_PORT}, or 0 for any that is free")
     family = socket.AF_INET6 if ":" in place.host else socket.AF_INET
     bound = socket.socket(family, socket.SOCK_STREAM)
     try:

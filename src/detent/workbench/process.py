@@ -51,6 +51,7 @@ def main(words: list[str]) -> int:
     order = _read_order(end)
     if order is None:
         return 0
+    told = end.dup()  # an engine that cannot be made closes its own
     try:
         with _engine(end, order) as engine, contextlib.ExitStack() as beside:
             if order.control is not None:
@@ -65,8 +66,8 @@ def main(words: list[str]) -> int:
                 engine.fail(error)
                 return 1
     except (Problem, ImagesUnusable, EndpointError, ValueError) as error:
-        end.setblocking(True)
-        end.sendall(packed(Failed(str(error), "", asked_wrongly=True)))
+        told.setblocking(True)
+        told.sendall(packed(Failed(str(error), "", asked_wrongly=True)))
         return 2
     return 0
 
