@@ -1,8 +1,11 @@
 """A cell behind real pins (a fake board) in the process of the workbench: what windows see, do, and may not do."""
 
 import asyncio
+import os
+import signal
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.workbench.patience import PATIENCE
@@ -10,6 +13,8 @@ from tests.workbench.patience import PATIENCE
 from detent.cell.description import Problem
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.workbench.client import Bench, BenchError
+from detent.workbench.line_scripts import LineScripts
+from detent.workbench.live import Live
 
 CELL = """
 [units.x]
@@ -83,6 +88,51 @@ def test_stop_and_recover(tmp_path: Path) -> None:
         await bench.until(lambda _: position(bench) == counted)  # the view comes to where the board has counted
         await bench.type("x", "-50")
         await bench.until(lambda _: position(bench) == counted - 50)
+        assert bench.crashed is None
+
+    play(scene, tmp_path)
+
+
+def test_a_process_that_does_not_take_a_stop_is_ended_and_that_is_told(tmp_path: Path) -> None:
+    """Boards stop when nobody drives them; one that hangs would go on with what it has planned when it wakes."""
+
+    async def scene(bench: Bench) -> None:
+        await bench.type("x", "+30000")
+        await bench.until(lambda _: position(bench) > 100)
+        pid = bench.engine_pid
+        assert pid is not None
+        os.kill(pid, signal.SIGSTOP)
+        with pytest.raises(BenchError, match=r"did not answer .* was ended: .* switch off the supply"):
+            await bench.stop_motors()
+        assert bench.engine_pid is None
+        assert bench.crashed is not None
+        assert "switch off the supply" in bench.crashed
+        with pytest.raises(BenchError, match="switch off the supply"):
+            await bench.stop_motors()
+        await bench.revive()
+        assert bench.state.real is not None
+
+    play(scene, tmp_path)
+
+
+def test_a_script_ends_where_the_machine_is_stopped_and_sends_nothing_when_it_goes_on(tmp_path: Path) -> None:
+    async def scene(bench: Bench) -> None:
+        live = Live()
+        scripts = LineScripts(bench, live)
+
+        def told() -> Any:
+            return live.get("script.x") or {}
+
+        scripts.start("x", "x", "+20\n@ 200 ms\n-20\n@ 200 ms\n@ again")
+        await bench.until(lambda _: told().get("line") == 3)
+        await bench.stop_motors()
+        await bench.until(lambda _: not told()["running"])
+        assert "nothing more is sent, as the machine stands: x: emergency stop" in told()["told"]
+        await bench.recover()
+        await bench.until(lambda state: any("goes on at" in mark.text for mark in state.marks))
+        assert not told()["running"]
+        with pytest.raises(BenchError, match="which would stop wherever it is"):
+            await bench.open_another("gs-c200")
         assert bench.crashed is None
 
     play(scene, tmp_path)

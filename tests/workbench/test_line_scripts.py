@@ -30,10 +30,11 @@ class Bench:
 
     def __init__(self) -> None:
         self.units = {"bar": SimpleNamespace(error=None)}
-        self.state = SimpleNamespace(now=0, held=False, speaking={"bar": 0}, units=self.units)
+        self.state = SimpleNamespace(now=0, held=False, speaking={"bar": 0}, units=self.units, real=None)
         self.picture = SimpleNamespace(lines={"bar": SimpleNamespace(units=("bar",))})
         self.sent: list[tuple[int, str]] = []
         self.answers = 0
+        self.slow = 0
 
     async def type(self, unit: str, text: str) -> None:
         if text == "BAD":
@@ -41,6 +42,7 @@ class Bench:
         if text == "T9999":
             self.units["bar"].error = SimpleNamespace(at=self.state.now, frame=text, reason="T takes 1 to 1000")
         self.sent.append((self.state.now, text))
+        self.state.now += self.slow
 
     async def until(self, condition: Callable[[Any], bool]) -> None:
         while not condition(self.state):
@@ -105,6 +107,26 @@ def test_a_command_is_repeated_at_an_interval_until_it_is_stopped() -> None:
 
     asyncio.run(whole())
     assert bench.sent[:3] == [(0, "V1"), (5 * SECOND // 4, "V1"), (9 * SECOND // 4, "V1")]
+
+
+def test_a_repeated_command_keeps_its_interval_however_long_each_takes() -> None:
+    bench = Bench()
+
+    async def whole() -> None:
+        scripts = LineScripts(bench, Live())  # type: ignore[arg-type]
+        bench.slow = SECOND // 4  # what a command takes, with its answer
+        scripts.repeat("bar", "bar", "F", SECOND)
+        while len(bench.sent) < 8:
+            await asyncio.sleep(0)
+        scripts.stop("bar")
+        with pytest.raises(ValueError, match="at the most"):
+            scripts.repeat("bar", "bar", "F", 0)
+
+    asyncio.run(whole())
+    assert [at for at, _ in bench.sent] == [n * SECOND for n in range(8)]
+
+
+def test_a_script_without_a_pause_is_not_begun_anew() -> None:
     with pytest.raises(ValueError, match="line 2: @ again needs a pause"):
         parse("V1\n@ again")
 

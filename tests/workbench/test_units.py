@@ -453,6 +453,29 @@ def test_a_unit_that_is_dead_delays_no_stop_of_others_on_its_line(tmp_path: Path
         at_desk(tmp_path, scene)
 
 
+def test_behind_a_stop_no_line_is_said_of_those_that_were_to_be_said_together(tmp_path: Path) -> None:
+    """Settings and a move from the page Motion: the move must not follow a STOP that came between."""
+
+    async def scene(desk: Desk) -> None:
+        name = await desk.units.unit_connect("bs0610", address, "motor=X patience=5")
+        sent = asyncio.create_task(desk.units.unit_lines(name, ["2000G", "I", "0G"]))
+        await desk.until(name, lambda facts: facts["job"])
+        heard = after_each(desk.units._units[name].tap.transcript, "take")
+        while "'command', 'I'" not in str((await desk.units.unit_talk(name))["rows"]):
+            heard.clear()
+            await heard.wait()
+        await desk.stopping.stop_all()
+        with pytest.raises(UnitBusy, match="broken off by a stop"):
+            await sent
+        said = str((await desk.units.unit_talk(name))["rows"])
+        assert said.count("'command', 'G'") == 1, "the line behind it was said"
+        told = await desk.units.unit_lines(name, ["100R", "7000O", "5G"])
+        assert [one["refused"] for one in told] == [False, True]
+
+    with served("bs0610", pace=1) as address:
+        at_desk(tmp_path, scene)
+
+
 @pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "bs0610", "supersigma"])
 def test_a_unit_that_stalls_is_unknown_and_stop_says_that_it_was_not_confirmed(tmp_path: Path, model: str) -> None:
     async def stall(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

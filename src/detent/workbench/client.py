@@ -45,6 +45,11 @@ from detent.workbench.talk import Talk, Talks
 
 PATIENCE: Ns = 2 * SECOND  # of the cell, for an answer to the command that keeps a program
 LEAVING = 5.0  # seconds that an engine has to end
+STOP_SECONDS = 2.0  # that it has to confirm an emergency stop
+UNDRIVEN = (
+    "the steps that its boards were given end within a moment, and their outputs fall when their watchdog runs out. "
+    "If anything moves, switch off the supply of its motor"
+)
 
 
 class BenchError(RuntimeError):
@@ -172,7 +177,7 @@ class Bench:
         if self._ready is not None and not self._ready.done():
             self._ready.set_exception(error)
         elif not self._closing:
-            self.crashed = str(error)
+            self.crashed = f"{error}: {UNDRIVEN}" if self._order.real else str(error)
         if self._writer is not None:
             self._writer.close()
         for future in (*self._asked.values(), *self._waiting):
@@ -239,6 +244,14 @@ class Bench:
         self._asked[self._number] = future
         self._writer.write(packed(Ask(self._number, verb, arguments)))
         return await future
+
+    async def _kill(self) -> None:
+        """End an engine that does not answer; whoever waits for it is told."""
+        process, reader = self._process, self._reader
+        if process is not None and process.returncode is None:
+            process.kill()
+        if reader is not None:
+            await asyncio.wait([reader])
 
     async def close(self) -> None:
         """End the engine. May be called twice."""
@@ -446,8 +459,19 @@ class Bench:
         await self._ask("mend", number)
 
     async def stop_motors(self) -> None:
-        """Emergency stop: every board stops at once, and every axis stands until `recover`."""
-        await self._ask("stop_motors")
+        """Emergency stop: every board stops at once, and every axis stands until `recover`.
+
+        Where the process that drives them has not confirmed it within `STOP_SECONDS`, it is ended: boards stop when
+        nobody drives them. Raises BenchError, also then.
+        """
+        try:
+            await asyncio.wait_for(self._ask("stop_motors"), STOP_SECONDS)
+        except TimeoutError:
+            await self._kill()
+            raise BenchError(f"the process that drives the boards did not answer within {STOP_SECONDS:g} s "
+                             f"and was ended: {UNDRIVEN}") from None  # fmt: skip
+        except BenchError as error:
+            raise BenchError(self.crashed or str(error)) from None
 
     async def recover(self) -> None:
         """Axes at fault go on from where their motors stand."""
@@ -485,8 +509,11 @@ class Bench:
     async def open_another(self, target: str) -> None:
         """Show the cell of `target` in place of this one, at the endpoints that were asked for, or with its own.
 
-        If that fails the old one is begun anew. Raises Problem, BenchError.
+        If that fails the old one is begun anew. Raises Problem, BenchError; also where this one drives a machine.
         """
+        if self._order.real:
+            raise BenchError("this workbench drives a machine, which would stop wherever it is: "
+                             "open the other cell in a workbench of its own")  # fmt: skip
         find_cell(target)  # what is wrong with it is said while the old one goes on
         async with self._opening:
             await self._open_another(target)

@@ -2,14 +2,18 @@
 
 One command a line, as it is typed; ``;`` begins a comment. ``@ 500 ms`` (or ``@ 0.5``, in seconds) is a pause, and
 ``@ answer`` waits until somebody has answered on the line since the last command; ``@ again`` begins anew from the
-first line. A script waits while the cell stands, and stops where a unit refuses a command.
+first line. A script waits while the cell stands, and stops where a unit refuses a command; behind real pins also where
+an axis stands at fault, as it does after STOP: nothing of it is sent behind that, nor when somebody says Recover.
 """
 
 import asyncio
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
+from detent.realtime.boards.states import Standing
 from detent.ticks import MS, Ns, parse_duration
 from detent.workbench.live import Live, Value
+from detent.workbench.messages import State
 from detent.workbench.words import check_typed
 
 if TYPE_CHECKING:
@@ -19,10 +23,11 @@ MOST_LINES = 10_000
 
 
 class Pause(NamedTuple):
-    """Wait so long in the time of the cell."""
+    """Wait so long in the time of the cell; `steady`: from when the last such pause should have ended."""
 
     line: int
     length: Ns
+    steady: bool = False
 
 
 class Answered(NamedTuple):
@@ -46,6 +51,7 @@ class Command(NamedTuple):
 
 Step = Pause | Answered | Again | Command
 
+LEAST_INTERVAL: Ns = 10 * MS  # between two of a command that is repeated
 SETTLED: Ns = 30 * MS  # behind the last character: by then a unit has turned down what it does not take
 
 
@@ -78,6 +84,11 @@ def parse(text: str, comment: str = ";") -> list[Step]:
     return steps
 
 
+def at_fault(state: State) -> bool:
+    """Whether an axis behind real pins stands until somebody says Recover."""
+    return state.real is not None and state.real.standing == Standing.FAULT.value
+
+
 class LineScripts:
     """Runs one script at a time on each line of a bench, and shows in `live` (``script.LINE``) how far it is."""
 
@@ -90,6 +101,15 @@ class LineScripts:
         steps = parse(text, comment)
         if not steps:
             raise ValueError("there is nothing to send; write one command a line")
+        self._begin(line, unit, steps)
+
+    def repeat(self, line: str, unit: str, text: str, every: Ns) -> None:
+        """Send a command to `unit` again and again, at an interval that does not drift. Raises ValueError, KeyError."""
+        if every < LEAST_INTERVAL:
+            raise ValueError(f"a command is sent again every {LEAST_INTERVAL / MS:g} ms at the most: write 0.1, say")
+        self._begin(line, unit, [Command(1, check_typed(text)), Pause(1, every, steady=True), Again(1)])
+
+    def _begin(self, line: str, unit: str, steps: list[Step]) -> None:
         units = self._bench.picture.lines[line].units
         if unit not in units:
             raise ValueError(f"{unit} is not on line {line}; there are: {', '.join(units)}")
@@ -106,6 +126,7 @@ class LineScripts:
     async def _run(self, line: str, unit: str, steps: list[Step]) -> None:
         told, at, place = "done", 0, 0
         bench = self._bench
+        due = bench.state.now
         try:
             heard = self._heard(line)
             while place < len(steps):
@@ -117,20 +138,29 @@ class LineScripts:
                         place = 0
                     case Command():
                         heard, error = self._heard(line), bench.state.units[unit].error
-                        await bench.until(lambda state: not state.held)
+                        await self._until(lambda state: not state.held)
                         await bench.type(unit, step.text)
-                        await bench.until(lambda state: state.speaking[line] + SETTLED <= state.now)
+                        await self._until(lambda state: state.speaking[line] + SETTLED <= state.now)
                         if (refused := bench.state.units[unit].error) is not None and refused != error:
                             raise ValueError(f"{unit} refused {refused.frame or step.text}: {refused.reason}")
                     case Pause():
                         until = bench.state.now + step.length
-                        await bench.until(lambda state, until=until: state.now >= until)  # type: ignore[misc]
+                        if step.steady:
+                            until = due = max(due + step.length, bench.state.now)
+                        await self._until(lambda state, until=until: state.now >= until)  # type: ignore[misc]
                     case Answered():
-                        await bench.until(lambda state, heard=heard: self._heard(line) > heard)  # type: ignore[misc]
+                        await self._until(lambda state, heard=heard: self._heard(line) > heard)  # type: ignore[misc]
         except (ValueError, RuntimeError) as error:
             told = f"line {at}: {error}"
         self._running.pop(line, None)
         self._tell(line, {"running": False, "line": at if told != "done" else 0, "told": told})
+
+    async def _until(self, condition: Callable[[State], bool]) -> None:
+        """Wait for it. Raises ValueError once an axis of a machine stands at fault."""
+        await self._bench.until(lambda state: condition(state) or at_fault(state))
+        real = self._bench.state.real
+        if real is not None and at_fault(self._bench.state):
+            raise ValueError(f"nothing more is sent, as the machine stands: {real.why}")
 
     def _heard(self, line: str) -> int:
         """How many whole rows of answers there are."""

@@ -7,7 +7,7 @@ from nicegui import ui
 
 from detent.workbench.board import PACES
 from detent.workbench.icons import icon
-from detent.workbench.pages import Page, Window
+from detent.workbench.pages import STOP_KEY, Page, Window
 
 STYLES = ("workbench.css", "unit.css")
 SCRIPTS = ("workbench.js", "timeline.js", "tour.js", "stop.js")
@@ -60,8 +60,7 @@ def _top(title: str, pages: Sequence[Page]) -> str:
   <h1 class="title" data-live="title">{escape(title)}</h1>
   <nav class="tabs" data-part="tabs" aria-label="Pages">{tabs}</nav>
   <span class="tools">
-    <button class="key stop" data-part="stop" hidden
-      data-help="Stop every unit that is connected, and every board (Esc twice); again: at once">STOP</button>
+    {STOP_KEY}
     <span class="others" data-level="windows" data-help="Windows that show this cell"><b data-live="windows"></b>
       windows</span>
     <button class="key bare" data-part="restart" aria-label="Begin anew"
@@ -74,12 +73,16 @@ def _top(title: str, pages: Sequence[Page]) -> str:
 </header>
 <dialog class="panel futures" data-part="futures" aria-label="Other futures"><h2>Other futures</h2>
 <p class="quiet">The cell went on from its past, and something else happened. What had happened before is kept.</p>
-<ul></ul><div class="row"><span class="grow"></span><button class="key" data-close>Close</button></div></dialog>
+<ul></ul><div class="row">{STOP_KEY}<span class="grow"></span><button class="key" data-close>Close</button></div>
+</dialog>
 <div class="alarm" role="alert" data-part="alarm"><span data-live="crashed"></span>
   <button class="key small primary" data-do="revive">Start the cell again</button></div>
 <div class="alarm halted" role="alert"><span data-live="realwhy"></span>
   <button class="key small primary" data-do="recover" data-help="Look at the machine first">Recover</button></div>
-<div class="alarm link" role="alert">No connection to the workbench. Trying again …</div>"""
+<div class="alarm link" role="alert">No connection to the workbench. Trying again …
+  <b class="stoppable">STOP reaches nothing meanwhile: if something moves, switch off the supply of its motor.</b></div>
+<div class="alarm unconfirmed" role="alert" data-part="unconfirmed"><span></span>
+  <button class="key small" data-close>Seen</button></div>"""
 
 
 def _bottom() -> str:

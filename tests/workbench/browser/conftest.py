@@ -5,7 +5,10 @@ which fails the test if a page asked another host for anything or raised an erro
 are written to that folder.
 """
 
+import json
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -61,6 +64,23 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Se
 def workbench(chromium: Any, serve: Callable[..., Served]) -> Served:
     """The workbench as it opens without a word: the drilling cell, running."""
     return serve()
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a DCB-274 that is served elsewhere: to the workbench it is a real one."""
+    serving = [sys.executable, "-c", "from detent.cli import main; main()", "serve", "dcb-274", "--tcp", "127.0.0.1:0"]
+    state = str(tmp_path_factory.mktemp("real"))
+    with subprocess.Popen([*serving, "--json", "--state", state], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        yield json.loads(process.stdout.readline())["endpoints"][0]["address"]
+        process.terminate()
+
+
+@pytest.fixture
+def bench(chromium: object, serve: Callable[..., Served], real: str) -> Served:
+    """A workbench with that unit, and the same model by the book."""
+    return serve("dcb-274", real, "--patience", "10")  # a loaded computer pauses between two characters
 
 
 @pytest.fixture(scope="module")

@@ -1,31 +1,7 @@
 """The page Unit in a real browser: a DCB-274 that is served elsewhere is the real one, its emulation stands beside."""
 
-import json
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
-
-import pytest
 from tests.workbench.browser.test_access import AXE, findings
-from tests.workbench.browser.windows import LOOKS, Served, Windows
-
-SERVE = [sys.executable, "-c", "from detent.cli import main; main()", "serve", "dcb-274", "--tcp", "127.0.0.1:0"]
-KNOWN = "() => { const it = detent.get('r.names'); return it.length && detent.get(`r.${it[0]}`).position !== null; }"
-
-
-@pytest.fixture(scope="module")
-def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The address of a unit."""
-    state = str(tmp_path_factory.mktemp("real"))
-    with subprocess.Popen([*SERVE, "--json", "--state", state], stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None
-        yield json.loads(process.stdout.readline())["endpoints"][0]["address"]
-        process.terminate()
-
-
-@pytest.fixture
-def bench(chromium: object, serve: Callable[..., Served], real: str) -> Served:
-    return serve("dcb-274", real, "--patience", "10")  # a loaded computer pauses between two characters
+from tests.workbench.browser.windows import KNOWN, LOOKS, Served, Windows
 
 
 def test_the_panel_shows_what_the_unit_tells_and_a_hand_moves_it(windows: Windows, bench: Served, real: str) -> None:

@@ -20,6 +20,10 @@ LOOKS = EVERY_LOOK if PICTURES else [(WIDE, "light"), (PHONE, "dark")]
 """Windows in which every page is looked at: all of them when pictures are wanted."""
 
 
+KNOWN = "() => { const it = detent.get('r.names'); return it.length && detent.get(`r.${it[0]}`).position !== null; }"
+"""The first unit that is connected has told where it stands."""
+
+
 class Served(NamedTuple):
     """A workbench that serves."""
 

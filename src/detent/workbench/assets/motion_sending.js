@@ -61,12 +61,18 @@ export class Sending {
    */
   async send(/** @type {About} */ { unit, real }, lines) {
     const sent = [];
-    for (const line of lines) {
-      if (real) {
-        const said = await this.motion.ask("unit_say", unit, line);
-        if (!said) return this.tell(sent, line, "was not sent");
-        if (said.refused) return this.tell(sent, line, `was refused: ${said.meaning || said.answers.join(" ")}`);
-      } else if ((await this.motion.ask("type", unit, line)) === undefined) return this.tell(sent, line, "was not sent");
+    if (real) {
+      // one job of the unit: STOP, in whichever window, ends all of it
+      const told = await this.motion.ask("unit_lines", unit, lines);
+      if (!told) {
+        this.told.textContent = "not all of it was obeyed: what was said stands on the Unit page";
+        return false;
+      }
+      const refused = told.findIndex((/** @type {any} */ said) => said.refused);
+      if (refused >= 0) return this.tell(lines.slice(0, refused), lines[refused], `was refused: ${told[refused].meaning || told[refused].answers.join(" ")}`);
+      sent.push(...lines);
+    } else for (const line of lines) {
+      if ((await this.motion.ask("type", unit, line)) === undefined) return this.tell(sent, line, "was not sent");
       sent.push(line);
     }
     this.told.textContent = `sent: ${sent.join(", ")}; the answers are on the ${real ? "Unit" : "Terminal"} page`;

@@ -210,7 +210,7 @@ part("terminal", (box) => {
     hint();
     const every = role("every").value;
     try {
-      if (every && to.value !== RAW) await call("run_script", line, to.value, `${written}\n@ ${Number(every)}\n@ again`, "");
+      if (every && to.value !== RAW) await call("repeat_command", line, to.value, written, Number(every));
       else if (to.value === RAW) await call("send", line, bytes(written));
       else await call("type", to.value, written);
       toEnd();

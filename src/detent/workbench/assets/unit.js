@@ -297,8 +297,9 @@ part("unit", (box) => {
 
   /** @param {Promise<string>} stopping */
   async function stopped(stopping) {
+    document.dispatchEvent(new CustomEvent("detent-stopping", { detail: stopping }));
     held.letGo(false);
-    const told = await tried(() => stopping);
+    const told = await stopping.catch(() => ""); // it stands above the page
     if (told) role("sent").textContent = told;
   }
 

@@ -43,6 +43,11 @@ if TYPE_CHECKING:
     from detent.workbench.live import Live
 
 
+STOP_KEY = """<button type="button" class="key stop" data-part="stop" hidden
+  data-help="Stop every unit that is connected, and every board (Esc twice); again: at once">STOP</button>"""
+"""The red key. Above every page there is one; a dialog that covers it has one of its own."""
+
+
 class Page(NamedTuple):
     """A page: its name on the tab, its path, the name of its icon in `workbench.icons`, how it is built.
 

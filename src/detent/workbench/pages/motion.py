@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from detent.motors.variants import QUANTITIES
 from detent.workbench.moves import Moves
-from detent.workbench.pages import Page, Window
+from detent.workbench.pages import STOP_KEY, Page, Window
 from detent.workbench.tuning import Tuning
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _page(tabs: str) -> str:
 </aside>
 <dialog class="motion-dialog panel" aria-label="Send to the unit"><h2></h2><p class="quiet"></p>
   <ol class="mono"></ol>
-  <div class="row"><button type="button" class="key" value="cancel">Cancel</button><span class="grow"></span>
+  <div class="row"><button type="button" class="key" value="cancel">Cancel</button>{STOP_KEY}<span class="grow"></span>
   <button type="button" class="key primary" value="send">Send</button></div></dialog>
 </section>"""
 

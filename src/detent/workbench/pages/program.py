@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from detent.workbench.editing import Editing
 from detent.workbench.icons import icon
-from detent.workbench.pages import Page, Window
+from detent.workbench.pages import STOP_KEY, Page, Window
 
 if TYPE_CHECKING:
     from fastapi import FastAPI
@@ -136,7 +136,7 @@ def _page(units: "Sequence[UnitPicture]") -> str:
   <input class="field mono" name="name" autocomplete="off" spellcheck="false" aria-label="file name">
   <ul class="program-list"></ul>
   <p class="program-asks" role="alert"></p>
-  <div class="row"><span class="grow"></span><button type="button" class="key" value="cancel">Cancel</button>
+  <div class="row">{STOP_KEY}<span class="grow"></span><button type="button" class="key" value="cancel">Cancel</button>
     <button type="submit" class="key primary" value="ok"></button></div>
 </form></dialog>
 </section>"""

@@ -3,11 +3,13 @@
 import json
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from nicegui import ui
+from pydantic import Field
 
 from detent.controllers.gsc200 import commands as gsc200
+from detent.ticks import SECOND
 from detent.workbench.icons import icon
 from detent.workbench.line_scripts import LineScripts
 from detent.workbench.live import Live
@@ -56,10 +58,13 @@ def offer(site: "FastAPI", bench: "Bench", live: Live) -> None:
     async def run_script(line: str, unit: str, text: str, comment: str = ";") -> None:
         scripts.start(line, unit, text, comment)
 
+    async def repeat_command(line: str, unit: str, text: str, every: Annotated[float, Field(ge=0, le=1e6)]) -> None:
+        scripts.repeat(line, unit, text, round(every * SECOND))
+
     async def stop_script(line: str) -> None:
         scripts.stop(line)
 
-    for call in (terminal, run_script, stop_script):
+    for call in (terminal, run_script, repeat_command, stop_script):
         live.offer(call.__name__, call)
 
 

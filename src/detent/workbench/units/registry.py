@@ -50,10 +50,10 @@ class Units:
         self._connecting = asyncio.Lock()  # two clicks are one connection
         self._turning = asyncio.Lock()  # the last word counts, not the last to be done
         live.put({"r.names": []})
-        for call in (self.unit_connect, self.unit_again, self.unit_leave, self.unit_say, self.unit_both, self.unit_move,
-                     self.unit_hold, self.unit_held, self.unit_stop, self.unit_asking, self.unit_talk, self.unit_source,
-                     self.unit_compare, self.unit_store, self.unit_backup, self.unit_differs,
-                     self.unit_restore):  # fmt: skip
+        for call in (self.unit_connect, self.unit_again, self.unit_leave, self.unit_say, self.unit_lines,
+                     self.unit_both, self.unit_move, self.unit_hold, self.unit_held, self.unit_stop,
+                     self.unit_asking, self.unit_talk, self.unit_source, self.unit_compare, self.unit_store,
+                     self.unit_backup, self.unit_differs, self.unit_restore):  # fmt: skip
             live.offer(call.__name__, call)
 
     # -- connecting --------------------------------------------------------------------------------------
@@ -156,6 +156,11 @@ class Units:
     async def unit_say(self, name: Name, line: Line) -> dict[str, object]:
         """A line as it is typed; what came of it."""
         return await self._said(self._unit(name), line)
+
+    async def unit_lines(self, name: Name, lines: Sequence[Line]) -> list[dict[str, object]]:
+        """Several lines, one after the other; what came of each. Nothing follows one that is refused, nor a STOP."""
+        unit = self._unit(name)
+        return [{"unit": name, **said._asdict()} for said in await unit.say_lines(lines)]
 
     async def unit_both(self, names: Sequence[Name], line: Line) -> list[dict[str, object]]:
         """The same line to several units at once; what came of it at each, an error too."""

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, TypeVar
 
 from detent.controllers import catalogue
@@ -210,16 +210,29 @@ class Unit:
         self._tell()
 
     async def say(self, line: str) -> tuple[Said, float]:
-        """A line as it is typed; what was said to it, and how many seconds passed from its first byte to the last.
+        """A line as it is typed; what was said to it, and how many seconds passed from its first byte to the last."""
+        self.tap.sent = self.tap.came = self.tap.began = 0.0  # others on its line may have their turn before
+        said = await self.perform(f"the line {line}", say(self.shell.driver, self._chosen(line)))
+        return said, max(self.tap.came - self.tap.began, 0.0)
 
-        It is for this motor: of a board with two it is chosen first, where a look at the other may have chosen that.
-        """
+    async def say_lines(self, lines: Sequence[str]) -> list[Said]:
+        """Several lines as one job, up to the first that is refused; behind a stop nothing of it is said."""
+        return await self.perform(f"the lines {', '.join(lines)}", self._lines(lines))
+
+    def _lines(self, lines: Sequence[str]) -> Steps[list[Said]]:
+        found: list[Said] = []
+        for line in lines:
+            found.append((yield from say(self.shell.driver, self._chosen(line))))
+            if found[-1].refused:
+                break
+        return found
+
+    def _chosen(self, line: str) -> str:
+        """A line for this motor: of a board with two it is chosen first, as a look at the other has chosen that."""
         driver = self.shell.driver
         if isinstance(driver, GenStepper) and line.strip()[:1].upper() not in CHOICES:
-            line = f"{driver.motor}{line.lstrip()}"
-        self.tap.sent = self.tap.came = self.tap.began = 0.0  # others on its line may have their turn before
-        said = await self.perform(f"the line {line}", say(driver, line))
-        return said, max(self.tap.came - self.tap.began, 0.0)
+            return f"{driver.motor}{line.lstrip()}"
+        return line
 
     # -- stop --------------------------------------------------------------------------------------------
 
