@@ -214,7 +214,8 @@ def _print_real(console: "Console", real: dict[str, Any]) -> None:
     rows = []
     for name, axis in real["axes"].items():
         rows.append([name, axis["standing"], axis["shaft"], "" if axis["known"] else "not known", axis["stops"],
-                     axis["slips"], f"{axis['lead'] / 1e6:g} ms", f"{axis['lag'] / 1e6:.3g} ms", _listed(axis["armed"])])  # fmt: skip
+                     axis["slips"], f"{axis['lead'] / 1e6:g} ms", f"{axis['lag'] / 1e6:.3g} ms",
+                     _listed(axis["armed"])])  # fmt: skip
     columns = ["axis", "standing", "steps", "motor", "stops", "slips", "lead", "lag", "stopped by"]
     console.print(_table("real pins", columns, rows))
     for name, axis in real["axes"].items():

@@ -1,7 +1,10 @@
 """A cell file with real pins, from opening its boards to letting go of them: what a service needs of all this."""
 
+import contextlib
 import gc
 import os
+import sys
+import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -27,6 +30,7 @@ from detent.ticks import MS, SECOND, Ns
 
 ENDING: WallNs = SECOND  # for the last steps to leave, and for boards to hear of the end; each
 PAUSE: WallNs = 5 * MS
+TURN = 0.0005  # seconds that another thread (of `--control`) may go on when the one that gives steps wants to
 PRIORITY = 20  # of the real-time class: above most, below what the system keeps for itself
 
 
@@ -53,6 +57,7 @@ class Opened:
         `least_lead` is for whoever has time: a busy computer is not late then.
         """
         self._real = real
+        self._turn: float | None = None  # of threads, before it was ours
         trial = build(described, read)
         self.plan: Plan = plan(described, trial.controllers(), least_lead)
         self.stages = stages(self.plan, trial)
@@ -88,6 +93,8 @@ class Opened:
     def begin(self, driven: Driven, pace: Pace) -> None:
         """The cell's present is now; from here on pulses leave."""
         driven.on_moving = _no_collection_while
+        self._turn = sys.getswitchinterval()
+        sys.setswitchinterval(TURN)
         driven.begin(pace, self._levels)
 
     def end(self, driven: Driven) -> None:
@@ -100,6 +107,8 @@ class Opened:
         driven.close()
         self._until(lambda: self.boards.quiet)
         self.boards.close()
+        if self._turn is not None:
+            sys.setswitchinterval(self._turn)
 
     def _until(self, done: Callable[[], bool]) -> None:
         begun = self._real.wall()
@@ -124,9 +133,15 @@ def _no_collection_while(moving: bool) -> None:
 
 
 def take_priority() -> str:
-    """Ask for real-time priority for this process; why not, if it may not, with the remedy, else nothing."""
+    """Ask for real-time priority for this process; why not, if it may not, with the remedy, else nothing.
+
+    All its threads get it, as those that they start will: one that waits for its turn while it has Python's lock keeps
+    the others from theirs.
+    """
     try:
-        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(PRIORITY))
+        for thread in threading.enumerate():
+            with contextlib.suppress(ProcessLookupError):  # it has just ended
+                os.sched_setscheduler(thread.native_id or 0, os.SCHED_RR, os.sched_param(PRIORITY))
     except PermissionError:
         return (
             "real-time priority is not allowed to this user: LimitRTPRIO=95 in its systemd unit, or "
