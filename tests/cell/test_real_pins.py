@@ -4,6 +4,7 @@ import pytest
 from tests.cell.cells import cell
 
 from detent.cell.description import Problem, parse
+from detent.cell.real_pins import behind_pins
 
 GOOD = """
 [units.slide]
@@ -187,3 +188,46 @@ def test_a_switch_of_the_cell_is_a_switch_too() -> None:
         "[units.table]", '[switches.soft]\naxis = "slide"\nfrom = 500\ndrives = "slide.EOT"\n[units.table]'
     )
     cell(text)
+
+
+END = '[switches.end]\ndrives = "slide.EOT"\naxis = "slide"\nfrom = 300\nmachine = true\n'
+
+
+def test_a_switch_of_the_machine_stands_in_for_it_where_no_pin_is_driven() -> None:
+    made = cell(GOOD + END)
+    made.type("slide", "H+")
+    made.run_to(10_000_000_000)
+    found = made.controllers()["slide"].status(made.now)
+    assert (found.position, found.pulses) == (10_000_000 - 400, 1000)  # there, and away again for home
+
+
+def test_where_pins_are_driven_the_real_one_counts() -> None:
+    mine = END.replace(".end", ".mine").replace("EOT", "UI2").replace("machine = true", "")
+    assert list(behind_pins(parse(GOOD + END + mine, "cell.toml")).switches) == ["mine"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error"),
+    [
+        ('axis = "slide"\nfrom = 300\n', "", r"switches\.end\.machine: such a switch is moved by an axis"),
+        ('axis = "slide"', 'axis = "table.X"', r"switches\.end\.drives: slide\.EOT is no input that is wired to the"),
+        ('axis = "slide"', 'axis = "other"', r"switches\.end\.axis: no driven axis 'other'; there are: slide, "),
+        ("slide.EOT", "slide.UI2", r"switches\.end\.drives: slide\.UI2 is no input that is wired"),
+        ("machine = true", "", r"hardware\.slide\.inputs\.EOT: slide\.EOT is on a wire from end in this cell already"),
+        ("machine = true", "machine = 1", r"switches\.end\.machine: "),
+    ],
+)  # fmt: skip
+def test_a_switch_of_the_machine_is_at_a_wired_input_of_a_driven_axis(old: str, new: str, error: str) -> None:
+    text = GOOD.replace('board = "left"\ninputs = { RST', 'board = "right"\ninputs = { RST').replace(
+        "[hardware.slide]",
+        '[boards.right]\nserial = "fake:"\nlead = "20 ms"\n[units.other]\nmodel = "gs-c200"\n[hardware.slide]',
+    )
+    text = text.replace('[hardware.table.X]\nboard = "left"', '[hardware.table.X]\nboard = "right"')
+    cell(text + END)
+    with pytest.raises(Problem, match=error):
+        cell(text + END.replace(old, new))
+
+
+def test_without_a_board_there_is_no_switch_of_the_machine() -> None:
+    with pytest.raises(Problem, match=r"switches\.end\.axis: no axis is driven; without machine = true"):
+        cell(GOOD[: GOOD.index("[boards")] + END)

@@ -95,7 +95,7 @@ class _Builder:
         self.join_wires()
         actions = [action for n, entry in enumerate(self.description.script, 1) for action in self.actions(n, entry)]
         self.check_nets()
-        if self.description.hardware:
+        if self.description.hardware or any(entry.machine for entry in self.description.switches.values()):
             controllers = {name: self.controller(name) for name in self.axis_units()}
             real_pins.check(self.description, controllers, self.joined)
         cell = Cell(self.wiring(lines), self.parts, [Net() for _ in self.nets],
@@ -420,7 +420,8 @@ class _Builder:
         part = self.names.index(unit)
         net = self.net_of.get((part, pin))
         ends = [] if net is None else self.nets[net]
-        named = [self.names[end.part] for end in ends if end.pin.kind.drives]
+        stands_in = {name for name, entry in self.description.switches.items() if entry.machine}
+        named = [name for end in ends if end.pin.kind.drives and (name := self.names[end.part]) not in stands_in]
         scripted = ["the script" for entry in self.description.script if f"{unit}.{pin}" in entry.set]
         return real_pins.Joined([*named, *scripted])
 

@@ -63,7 +63,7 @@ class Board(_Table):
 
     serial: str
     """The device: a name in `/dev/serial/by-id` stays the same whatever is plugged in when; `fake:` is a board of our
-    own that moves nothing."""
+    own that moves nothing, with the switches of the cell file that have `machine = true`."""
     lead: DurationField = 30 * MS
     """What leaves the pins is so long behind the cell: 3 to 500 ms, the same on all boards of a cell."""
     margin: DurationField | None = None
@@ -174,7 +174,7 @@ class Hardware(_Table):
     outputs: dict[str, OutPin] = {}
     """Outputs of the controller, by its names."""
     inputs: dict[str, InPin] = {}
-    """Inputs of the controller; one that is wired here takes no wire, no switch and no script."""
+    """Inputs of the controller; one that is wired here takes no wire, no script, and no switch but of the machine."""
     unwired: Names = []
     """Limit and home switches that this machine does not have."""
     sample: DurationField = 50 * US

@@ -1,6 +1,7 @@
 """Whether the hardware tables of a cell make sense: units, axes, pins, wires. What only a board can tell it tells."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from detent.cell.description import Description, Problem
@@ -30,6 +31,11 @@ def device_of(address: str) -> tuple[str, str]:
 def bare(pin: str) -> str:
     """The name of a pin of a board without its signs."""
     return pin.lstrip("!^~")
+
+
+def behind_pins(described: Description) -> Description:
+    """The cell whose pins are driven: without the switches that stand for those of the machine, which are there."""
+    return replace(described, switches={n: entry for n, entry in described.switches.items() if not entry.machine})
 
 
 def check(described: Description, controllers: Mapping[str, Controller], joined: Callable[[str, str], Joined]) -> None:
@@ -83,10 +89,30 @@ def check(described: Description, controllers: Mapping[str, Controller], joined:
         if table.step is not None and gates:
             what = f"{gates[0]} lets every single pulse of {unit} through: on real pins each would take {HOLD}"
             raise problem("", f"{what} to be looked at; remove the wire to {unit}.ENABLE, or this table")
+    _check_machine(described)
     for key, table in described.hardware.items():
         unit, _, axis = key.partition(".")
         if table.step is not None:
             _check_switches(described, key, controllers[unit], axis, joined)
+
+
+def _check_machine(described: Description) -> None:
+    """A switch that stands for one of the machine is at a driven axis, and at inputs that are wired to its board."""
+    for name, entry in described.switches.items():
+        if not entry.machine:
+            continue
+        where = f"switches.{name}"
+        driven = [key for key, table in described.hardware.items() if table.step is not None]
+        if entry.axis not in driven:
+            what = str(catalogue.unknown("driven axis", entry.axis or "", driven)) if driven else "no axis is driven"
+            raise Problem(described.file, f"{where}.axis", f"{what}; without machine = true it is a switch of the cell")
+        for target in entry.drives:
+            unit, _, pin = target.partition(".")
+            mine = [table for key, table in described.hardware.items() if key.partition(".")[0] == unit]
+            board = described.hardware[entry.axis].board
+            if not any(pin in table.inputs and table.board == board for table in mine):
+                what = f"{target} is no input that is wired to the board of {entry.axis}: wire it in [hardware.{unit}]"
+                raise Problem(described.file, f"{where}.drives", f"{what}, or leave out machine")
 
 
 def _check_devices(described: Description, used: set[str]) -> None:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import AliasChoices, BaseModel, Field, model_validator
 
-from detent.cell.fields import STRICT, DurationField, LevelField, Names, Number, Steps
+from detent.cell.fields import STRICT, DurationField, Flag, KeyFault, LevelField, Names, Number, Steps
 from detent.pins import HIGH, LOW
 
 LEAST_LEAD = 1e-9
@@ -40,9 +40,14 @@ class Switch(_Table):
     """A range of one step: the same as `from` and `to`."""
     inside: LevelField = LOW
     """The level within the range; outside it is the other one."""
+    machine: Flag = False
+    """It stands for a switch of the machine that is wired in `[hardware]`: without `--real`, and behind a `fake:`
+    board. Where pins are driven the real one counts."""
 
     @model_validator(mode="after")
     def _placed(self) -> "Switch":
+        if self.machine and self.axis is None:
+            raise KeyFault("machine", "such a switch is moved by an axis: name it with axis = 'UNIT'")
         places = (self.start, self.end, self.at)
         if self.axis is None and any(place is not None for place in places):
             raise ValueError("from, to and at are places on an axis: name it with axis = 'UNIT'")

@@ -18,6 +18,7 @@ from detent.cell.circuit import Oscillation
 from detent.cell.description import Description, Problem
 from detent.cell.mechanics import Mechanics
 from detent.cell.outside import Store, no_store
+from detent.cell.real_pins import behind_pins
 from detent.controllers import catalogue
 from detent.motors.motor import MotorError
 from detent.pins import Level
@@ -90,6 +91,7 @@ class Service:
             stores, inputs, opened = None, None, None
             if real is not None:
                 opened = Opened(description, read, real)
+                self.description = description = behind_pins(description)
                 opening.callback(opened.boards.close)
                 stores, inputs = HeldStores(no_store if images is None else images.save), opened.inputs
             self.cell = build_with_images(

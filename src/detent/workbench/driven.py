@@ -16,7 +16,7 @@ from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.history import History
 from detent.cell.outside import no_store
-from detent.cell.real_pins import unreal
+from detent.cell.real_pins import behind_pins, unreal
 from detent.cell.stores import Stores
 from detent.outputs.units import views
 from detent.realtime.boards.drive import Opened, RealPins
@@ -53,8 +53,10 @@ class DrivenEngine(Engine):
         self._found, self._reports = found, list[str]()
         self._marks = Marks()
         self._shown: set[int] = set()
-        described, read, images = found.description, found.read, self._images
-        self._boards = opened = Opened(described, read, RealPins(self._news))
+        read, images = found.read, self._images
+        self._boards = opened = Opened(found.description, read, RealPins(self._news))
+        self._found = found = found._replace(description=behind_pins(found.description))
+        described = found.description
         self._opening.callback(opened.boards.close)
         stores = HeldStores(no_store if images is None else images.save)
         serial = any(spec.kind == "serial" for spec in self._order.endpoints)

@@ -9,12 +9,14 @@ import pytest
 from tests.realtime.boards.test_driven import CELL
 from tests.realtime.served import no_file
 
+from detent.cell.build import build
 from detent.cell.description import Problem, parse
 from detent.realtime.boards.drive import RealPins, take_priority
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.chips import Chip
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
+from detent.realtime.boards.ports import open_port
 from detent.realtime.boards.states import News
 from detent.realtime.control import Control
 from detent.realtime.endpoints.spec import EndpointSpec
@@ -272,3 +274,49 @@ def test_no_thread_keeps_a_cell_with_real_pins_from_its_turn_for_long() -> None:
         run(service, wall, 100 * MS)
         assert sys.getswitchinterval() <= 0.001
     assert sys.getswitchinterval() == before
+
+
+MACHINE = """
+[units.slide]
+model = "gs-c200"
+straps = { REC = "low" }
+shaft = 40
+[boards.b]
+serial = "fake:"
+[hardware.slide]
+board = "b"
+step = "!gpio2"
+dir = "!gpio3"
+enable = "!gpio4"
+inputs = { EOT = "^gpio10", HOME = "^!gpio11" }
+[switches.end]
+drives = "slide.EOT"
+axis = "slide"
+from = 300
+machine = true
+[switches.home]
+drives = "slide.HOME"
+axis = "slide"
+to = -20
+machine = true
+"""
+
+
+def test_a_fake_board_has_the_machine_of_the_cell_file_behind_it() -> None:
+    """Homing at power-on ends where it does in virtual time, stopped by switches that the board reads."""
+    ideal = build(parse(MACHINE, "cell.toml"), no_file)
+    ideal.run_to(20 * SECOND)
+    port = open_port("fake:")
+    assert isinstance(port, FakePort)
+    service, wall, news = made(MACHINE, port=port)
+    with service:
+        run(service, wall, 20 * SECOND)
+        assert service.driven is not None
+        [axis] = service.driven.axes()
+        assert axis.stops == 2
+        assert axis.shaft == port.board.machine.axes["slide"].position == -20
+        assert not service.description.switches
+        found, same = (one.controllers()["slide"].status(one.now) for one in (service.cell, ideal))
+        assert found == same
+        assert port.board.machine.steps == []  # nobody reads them
+    assert not news

@@ -195,6 +195,7 @@ class Check:
             for heard in self._heard:
                 if isinstance(heard, Stopped) and heard.stepper == axis.stepper:
                     made = abs(heard.shaft - began)
+                    met = [one for one in met if one.input != heard.input]  # this is where it was, exactly
                     met.append(Met(heard.input, int(heard.level), made))
                     stepper.rewind(heard.shaft)
                     why = f"{heard.input} changed to {int(heard.level)}"

@@ -10,10 +10,13 @@ from detent.cell.real_pins import device_of
 from detent.controllers.device import Stage
 from detent.pins import Level
 from detent.realtime.boards.events import DriverFault, DriverSet, Lost, Ready, Refusal
+from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.machine import MachineAxis, MachineSwitch
+from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.port import Port
 from detent.realtime.boards.ports import FAKE
-from detent.realtime.boards.setup import SetupProblem
+from detent.realtime.boards.setup import BoardSetup, SetupProblem
 from detent.realtime.boards.several import Boards
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, SECOND, Ns
@@ -42,6 +45,8 @@ def boards_of(plan: Plan, open_port: Callable[[str], Port]) -> Boards:
                 opened.append(open_port(address))
             except OSError as error:
                 raise NotYet(plan.file, f"boards.{setup.name}.serial", str(error)) from None
+            if isinstance(opened[-1], FakePort):
+                _furnish(opened[-1].board, plan, setup)
         try:
             return Boards([(setup, port) for (setup, _), port in zip(plan.setups, opened, strict=True)])
         except SetupProblem as problem:
@@ -50,6 +55,23 @@ def boards_of(plan: Plan, open_port: Callable[[str], Port]) -> Boards:
         for port in opened:
             port.close()
         raise
+
+
+def _furnish(board: FakeBoard, plan: Plan, setup: BoardSetup) -> None:
+    """Put a machine behind a fake board that has none: an axis for each stepper, with the switches of the cell file."""
+    if board.machine.axes:
+        return
+    shafts = {axis.stepper: axis.shaft for axis in plan.axes}
+    for stepper in setup.steppers:
+        mine = [each for each in plan.stand_ins if (each.board, each.stepper) == (setup.name, stepper.name)]
+        minus = None if stepper.minus is None else stepper.minus.name
+        reverse = stepper.dir.active_low and minus is None
+        axis = MachineAxis(stepper.step.name, stepper.dir.name, reverse, minus, shafts[stepper.name])
+        switches = [
+            MachineSwitch(stepper.name, each.pin.name, each.low, each.high, each.inside is not each.pin.active_low)
+            for each in mine
+        ]
+        board.machine.add(stepper.name, axis, switches, board.now)
 
 
 def make_ready(

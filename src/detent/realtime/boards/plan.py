@@ -15,6 +15,7 @@ from detent.ticks import MS, US, Ns
 
 MOST_MARGIN: Ns = 4 * MS
 LEAST_PULSE: Ns = 2 * US
+ANYWHERE = 1 << 62  # beyond every place of an axis
 CYCLE = 64  # places in a full step, of a `Stage`
 
 UnitPin = tuple[str, str]
@@ -34,6 +35,17 @@ class DrivenAxis(NamedTuple):
     stage: Stage | None = None  # what its driver is told where the controller commands nothing
 
 
+class StandIn(NamedTuple):
+    """A switch that a fake board has in place of the machine's: at an input of `board`, on an axis of it."""
+
+    board: str
+    pin: Pin
+    stepper: str
+    low: int
+    high: int
+    inside: bool  # the level within its places, as the controller reads it
+
+
 class Plan(NamedTuple):
     """What hangs on the boards of a cell. `setups` come with the address of each; the first is master of time."""
 
@@ -46,6 +58,7 @@ class Plan(NamedTuple):
     held: bool  # replies wait until nothing can change them
     file: str
     keys: Mapping[str, str]  # where the file says what hangs there, by name; of a pin the whole key
+    stand_ins: tuple[StandIn, ...] = ()
 
     def problem(self, fault: SetupProblem) -> Problem:
         """The same with the key of the cell file."""
@@ -99,7 +112,22 @@ def plan(described: Description, controllers: Mapping[str, Controller], least_le
     setups = tuple((hang[name].setup(name, board), board.serial) for name, board in zip(used, boards, strict=True))
     held = all(board.replies == "held" for board in boards)
     lead = max(board.lead for board in boards)
-    return Plan(setups, tuple(axes), outs, inputs, board_of, lead, held, described.file, keys)
+    return Plan(setups, tuple(axes), outs, inputs, board_of, lead, held, described.file, keys, _stand_ins(described))
+
+
+def _stand_ins(described: Description) -> tuple[StandIn, ...]:
+    found = []
+    for entry in described.switches.values():
+        if not entry.machine or entry.axis is None:
+            continue
+        low, high = entry.range
+        places = -ANYWHERE if low is None else int(low), ANYWHERE if high is None else int(high)
+        for target in entry.drives:
+            unit, _, pin = target.partition(".")
+            mine = (table for key, table in described.hardware.items() if key.partition(".")[0] == unit)
+            table = next(table for table in mine if pin in table.inputs)
+            found.append(StandIn(table.board, Pin.parse(table.inputs[pin]), entry.axis, *places, entry.inside == HIGH))
+    return tuple(found)
 
 
 class _Hang:

@@ -168,7 +168,7 @@ def open_port(address: str) -> Port:
         if make is None:
             raise PortError(f"{address}: there is no such fake board; there are {', '.join(FAKE + k for k in FAKES)}")
         board = make()
-        board.kept_log = False
+        board.kept_log = board.machine.kept = False
         board.chips = Chips()
         return FakePort(board, address=address)
     return SerialPort(address)

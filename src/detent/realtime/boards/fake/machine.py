@@ -1,6 +1,6 @@
 """The machine behind a fake board: axes that count steps, switches that follow them, levels of its pins."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 Watcher = Callable[[str, bool, int], None]
@@ -41,6 +41,7 @@ class Machine:
     edges: list[tuple[int, str, bool]] = field(default_factory=list)  # (tick, pin, level) of every output but steps
     steps: list[tuple[int, str, int]] = field(default_factory=list)  # (tick, axis, position behind it)
     watchers: list[Watcher] = field(default_factory=list)
+    kept: bool = True  # whether `edges` and `steps` are
 
     def __post_init__(self) -> None:
         self._settle(0)
@@ -60,7 +61,8 @@ class Machine:
         """The board drives an output."""
         if self.outputs.get(pin) is not level:
             self.outputs[pin] = level
-            self.edges.append((tick, pin, level))
+            if self.kept:
+                self.edges.append((tick, pin, level))
 
     def pulse(self, pin: str, direction_pin: str, tick: int) -> None:
         """The active edge of a step pulse."""
@@ -72,7 +74,14 @@ class Machine:
             else:
                 continue
             axis.position += 1 if up is not axis.reverse else -1
-            self.steps.append((tick, name, axis.position))
+            if self.kept:
+                self.steps.append((tick, name, axis.position))
+        self._settle(tick)
+
+    def add(self, name: str, axis: MachineAxis, switches: Sequence[MachineSwitch], tick: int) -> None:
+        """An axis with switches on it."""
+        self.axes[name] = axis
+        self.switches += switches
         self._settle(tick)
 
     def move(self, axis: str, position: int, tick: int) -> None:
