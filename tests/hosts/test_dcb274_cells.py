@@ -214,7 +214,7 @@ def test_a_unit_that_lost_its_supply_in_a_move_is_told_and_signed_on_again() -> 
     with pytest.raises(NoAnswer):
         unit.moving()
     cell.power("unit", True)
-    with pytest.raises(NoAnswer, match="was switched off and on, or reset: it is at 0"):
+    with pytest.raises(MotionFailed, match="was switched off and on, or reset: it is at 0"):
         unit.wait()
     unit.wait()
     unit.move_by(10)

@@ -393,9 +393,10 @@ def _check(drive: int, report: Report, steps: int | None = None) -> None:
     if report.refused:
         raise DriveFailed(drive, "refused a command", report)
     if steps is not None and report.steps != steps:
-        raise DriveFailed(
-            drive, f"made {report.steps} of {steps} steps: a message was lost or damaged on the bus", report
-        )
+        why = "a message was lost or damaged on the bus"
+        if not report.steps:
+            why += ", or its supply was lost, and its place with it: originate()"
+        raise DriveFailed(drive, f"made {report.steps} of {steps} steps: {why}", report)
 
 
 class BlockingSupersigma(Blocking, Supersigma):

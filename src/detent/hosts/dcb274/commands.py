@@ -12,8 +12,13 @@ from detent.hosts.dcb274.answers import Inputs, JogInputs, Ports, Settings
 from detent.hosts.dcb274.handshake import SingleMode
 from detent.hosts.dcb274.ranges import LARGEST_ADDRESS, MOST_STEPS, between, place, program_address, sign, speed
 from detent.hosts.dcb274.unit import CLEARING, SAVING, Unit
+<<<<<<< HEAD
 from detent.hosts.errors import BadAnswer
 from detent.hosts.exchange import Ask, Rest, Steps, operation
+=======
+from detent.hosts.errors import BadAnswer, DriverError
+from detent.hosts.exchange import Ask, Rest, Steps, attempt, operation
+>>>>>>> 79e8a79 (A supply that is lost in a call is told by every driver, and the next call works; a generated law holds them to it)
 
 CELLS_AT_ONCE: Final = 32  # bytes of one [: the answer fits into the buffer of a SIN-10
 READ_BACK: Final = 128  # the flag of l that reads, and with 1 of A
@@ -337,6 +342,9 @@ class Commands(Unit):
         except GeneratorExit:
             self._connected, self._broken = False, True
             raise
+        except DriverError:  # it may be off: whoever comes next sees whether it signs on
+            self._connected = False
+            raise
         way.running = self._storing = self.programming = False
 
     def _leave_program_mode(self) -> Steps[None]:
@@ -350,5 +358,9 @@ class Commands(Unit):
         """ESC: every axis on the line stops at once, without a ramp, and ends its program (page 33)."""
         self._stops += 1
         self._leave(None)
-        yield from self._way.escape()
+        try:
+            yield from self._way.escape()
+        except DriverError:  # it may be off
+            self._connected = False
+            raise
         self._way.running = self.programming = False

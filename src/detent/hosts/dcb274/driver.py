@@ -1,6 +1,7 @@
 """The DCB-274 as an axis: the common face over its commands (`detent.hosts.axis`), and the two shells."""
 
 from detent.hosts.axis import Limits, Speeds
+from detent.hosts.dcb274.handshake import RESET
 from detent.hosts.dcb274.memory import Memory
 from detent.hosts.dcb274.ranges import CEILING, FARTHEST, SLOWEST, ramp_seconds, told
 from detent.hosts.dcb274.unit import REST
@@ -116,14 +117,18 @@ class Dcb274(Memory):
         another thread ends the wait and is no failure.
         """
         yield from super().wait(timeout)
-        target, search = self._target, self._search
+        target, search, cut_short = self._target, self._search, self._cut_short
         self._leave(None)
+        if cut_short:
+            raise MotionFailed(self.title, RESET)
         told = self._times_told
         if target is not None:
             position = yield from self.position()
             if position != target and self._times_told == told:
                 met = yield from self.limits()
                 why = "limit A is met" if met.high else "limit B is met" if met.low else "was it stopped otherwise?"
+                if not position:
+                    why += " Or was its supply lost?"
                 raise MotionFailed(self.title, f"stands at {position}, not at {target}: {why}")
         elif search:
             met = yield from self.limits()

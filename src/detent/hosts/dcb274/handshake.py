@@ -29,6 +29,9 @@ RESTART: Final = 0.1  # seconds that a unit may take from ^C or ^P until it list
 SCAN: Final = 10.0  # seconds for `&`: 86 names, each with a time-out of the adapter's own
 
 
+RESET: Final = "was switched off and on, or reset: it is at 0, with the settings of its NV memory"
+
+
 class NotListening(NoAnswer):
     """Not even the first character is echoed: a program runs, a command waits, the axis jogs, or nobody is there."""
 
@@ -132,10 +135,8 @@ class SingleMode(Handshake):
             what = "does not answer SPACE: it runs a program, which ESC ends, is on a party line, or is off"
             raise NoAnswer(self.title, what, Spoken(SPACE, b""), "abort() sends ESC")
         version = re.search(rb"V\d+\.\d+", answer.data)
-        if version is not None and self._typed:
-            # It was reset while a line was typed, and has taken a character of that for its name (page 23).
-            yield from self.restart(CTRL_C)
-            yield Ask(SPACE, until(b"\r\n"), self.patience)
+        if version is not None:
+            yield from self._named()
         self._typed = False
         if version is None:
             if answer.whole:
@@ -156,7 +157,17 @@ class SingleMode(Handshake):
         answer = yield Ask(SPACE, until(b"\r\n"), self.patience)
         if answer.data == SPACE:
             yield from self._erase()
-        return re.search(rb"V\d+\.\d+", answer.data) is not None
+        if re.search(rb"V\d+\.\d+", answer.data) is None:
+            return False
+        yield from self._named()
+        return True
+
+    def _named(self) -> Steps[None]:
+        """It has signed on. If it was reset while a line was typed it has taken a character of that for its name."""
+        if self._typed:
+            yield from self.restart(CTRL_C)
+            yield Ask(SPACE, until(b"\r\n"), self.patience)
+        self._typed = False
 
     def line(self, text: str, seconds: float, tries: int = TRIES) -> Steps[str]:
         """Each character when the echo of the last has come, CR, the result up to CR LF."""
@@ -165,7 +176,7 @@ class SingleMode(Handshake):
         spoken = Spoken(text.encode() + CR, text.encode() + answer.data)
         if not answer.whole:
             self._typed = True
-            raise NoAnswer(self.title, f"echoes {text!r} but does not finish its answer", spoken)
+            raise NoAnswer(self.title, f"echoes {text!r} but does not finish its answer: was its supply lost?", spoken)
         result = answer.data[:-2].decode("latin-1")
         if result == "#":
             raise self.refused(text, spoken)
@@ -186,6 +197,7 @@ class SingleMode(Handshake):
                 return
             if not self.running:
                 yield from self._erase()
+        self._typed = not self.running
         spoken = Spoken(text.encode("latin-1"), echo)
         if not echo:
             raise NotListening(
@@ -235,11 +247,17 @@ class SingleMode(Handshake):
                 raise BadAnswer(self.title, ECHOES, Spoken(b"@\r", b"@\r"))
             heard, known, wrong = answer.data, False, wrong + 1
             if wrong >= TRIES:
+<<<<<<< HEAD
                 break
         spoken = Spoken(b"@\r", heard)
         if others or wrong:
             what = "answers its stop command with something else; it was told to stop, and may still move"
             raise BadAnswer(self.title, what, spoken, "abort() sends ESC")
+=======
+                raise BadAnswer(self.title, "answers its stop command with something else", Spoken(b"@\r", heard))
+        if (yield from self.signs_on()):
+            raise NoAnswer(self.title, RESET, Spoken(b"@", heard))
+>>>>>>> 79e8a79 (A supply that is lost in a call is told by every driver, and the next call works; a generated law holds them to it)
         what = "does not take its stop command: it is off, or the line is broken"
         raise NoAnswer(self.title, what, spoken, "abort() sends ESC")
 
@@ -336,7 +354,9 @@ class PartyLine(Handshake):
         entered = (self.name + text).encode("latin-1")
         spoken = Spoken(entered + LF, entered + answer.data)
         if not answer.whole:
-            raise NoAnswer(self.title, f"echoes {self.name + text!r} but does not finish its answer", spoken)
+            raise NoAnswer(
+                self.title, f"echoes {self.name + text!r} but does not finish its answer: was its supply lost?", spoken
+            )
         result = answer.data[:-1].decode("latin-1")
         if result == "#":
             raise self.refused(text, spoken)

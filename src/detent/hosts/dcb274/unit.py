@@ -9,6 +9,7 @@ from detent.hosts.dcb274.handshake import (
     CTRL_C,
     CTRL_N,
     CTRL_P,
+    RESET,
     TRIES,
     Adapter,
     DaisyChain,
@@ -66,6 +67,7 @@ class Unit(Axis):
         self._times_told = 0  # how often it was told to do something else
         self._target: int | None = None  # where the index under way should end, if that is known
         self._search = 0  # direction of the search for home under way
+        self._cut_short = False  # the unit was reset before that was seen to end
         self._divide: int | None = None
         self._slope: tuple[int, int] | None = None
 
@@ -88,7 +90,15 @@ class Unit(Axis):
         The first call of any operation does this by itself, and again after the port was lost. Returned is the
         version if the unit tells. A SIN-10 that does not know the axis yet resets all axes to look for them (page 19).
         """
-        self.version = (yield from self._way.connect()) or self.version
+        try:
+            version = yield from self._way.connect()
+        except NoAnswer as error:  # it was reset meanwhile: then again
+            heard = error.spoken is not None and error.spoken.received
+            if not (heard and (yield from self._way.signs_on())):
+                raise
+            version = yield from self._way.connect()
+        self.version = version or self.version
+        self._cut_short = bool(version) and (self._target is not None or self._search != 0)
         self._connected, self._broken = True, False
         if isinstance(self._way, SingleMode):
             self._storing = self.programming = False  # X was answered
@@ -135,12 +145,14 @@ class Unit(Axis):
         try:
             return (yield from self._way.line(text, seconds, tries))
         except NoAnswer as error:
-            deaf = isinstance(error, NotListening)
-            self._connected = deaf and (self._way.running or not (yield from self._way.signs_on()))
-            if deaf and not self._connected:
+            self._connected = isinstance(error, NotListening) and self._way.running
+            if not self._connected and (yield from self._way.signs_on()):
                 self._leave(None)
-                what = "was switched off and on, or reset: it is at 0, with the settings of its NV memory"
-                raise NoAnswer(self.title, what, error.spoken) from None
+                self.forget()
+                raise NoAnswer(self.title, RESET, error.spoken) from None
+            raise
+        except BadAnswer:  # of a unit that came back in the middle of the line, say
+            self._connected = False
             raise
         except GeneratorExit:  # the caller was cancelled
             self._connected, self._broken = False, True
@@ -183,7 +195,7 @@ class Unit(Axis):
 
     def _leave(self, target: int | None) -> None:
         """Another motion begins, or the one under way is ended: it should end at `target`, if that is known."""
-        self._target, self._search = target, 0
+        self._target, self._search, self._cut_short = target, 0, False
         self._times_told += 1
 
     # -- resets ------------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from detent.hosts.errors import BadAnswer
 from detent.hosts.exchange import Steps, operation
-from detent.hosts.genstepper.dialogue import ACTION, Action, Dialogue
+from detent.hosts.genstepper.dialogue import ACTION, SIGN_ON, Action, Dialogue
 
 LARGEST: Final = 2_147_483_647  # a position, either way
 RATES: Final = range(1, 62_501)  # microsteps/s, and microsteps/s/s
@@ -24,7 +24,6 @@ POSITION = -1
 LIMITS, AUTO_RATE, STEP_SIZE = 5, 252, 253  # memory locations
 RESET_SECONDS = 1.0  # deaf for 250 ms, then the sign-on
 
-SIGN_ON = re.compile(rb"\$version: ([0-9.]+)\$.*\*", re.DOTALL)
 LATCHED = re.compile(rb"L,(\d+)(?:\r\n)?\*")
 PROMPT = re.compile(rb"\*")
 

@@ -21,6 +21,8 @@ LONGEST = 150  # characters of an answer: all reports of a motor
 PATIENCE = 1.0  # seconds that a board, an adapter and this computer may take to begin an answer
 TRIES = 3
 FLUSH = b"00"
+SIGN_ON: Final = re.compile(rb"\$version: ([0-9.]+)\$.*\*", re.DOTALL)
+RESET: Final = "was switched off and on, or reset: it is at 0, with the settings of power-on; say it again"
 FLUSH_SECONDS = 0.05  # until the character that was being sent has come, through whatever adapter
 
 ACTION = -8
@@ -54,10 +56,11 @@ class Dialogue(Axis):
         self.patience = patience
         self._timeout = patience + LONGEST * LINE_BITS / baud
         self._stale = True  # something may have come, or may still come, that nobody asked for
+        self._met = False  # it has answered: if it signs on now, what was agreed on with it is gone
 
     def forget(self) -> None:
-        """The connection was lost: what comes first may be old."""
-        self._stale = True
+        """The connection was lost, or the board was reset: what comes first may be old."""
+        self._stale, self._met = True, False
 
     def ask(  # type: ignore[override]  # a question in commands, where the base has bytes
         self, commands: str, number: int, *, again: bool = True
@@ -92,7 +95,11 @@ class Dialogue(Axis):
         for left in reversed(range(TRIES)):
             answer = yield Ask(data, lambda came: found.end() if (found := wanted.search(came)) else None, timeout)
             match = wanted.search(answer.data)
+            if self._met and b"$version" in answer.data and wanted is not SIGN_ON:
+                self.forget()
+                raise BadAnswer(self.title, RESET, Spoken(data, answer.data))
             if match is not None:
+                self._met = True
                 self._stale = False
                 return match
             yield from self._flush()

@@ -134,6 +134,7 @@ class Commands(Dialogue):
 
     def _cut_off(self) -> None:
         """A stop ends a homing, wherever that has come to."""
+        self.otherwise()
         self._cut = self._cut or (self._homing and not self.signed)
         self._homing = False
 

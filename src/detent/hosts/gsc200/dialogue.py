@@ -94,6 +94,9 @@ class Dialogue(Axis):
         self._owed = ""  # an error of what was begun that was told to us between, and not yet by us
         self._homing = False  # homing was begun, and was not seen to end
         self._cut = False  # a homing was cut off: a GS-C200's counter may have gone below 0
+        self._silent = False  # it gave no answer at all to something, since the last motion was begun
+        self._target: int | None = None  # where the move under way should end, if that is known
+        self._times_told = 0  # how often it was told to do something else
 
     def forget(self) -> None:
         """The connection was lost: what comes first may be old, and the module may have been switched off."""
@@ -116,6 +119,7 @@ class Dialogue(Axis):
         for left in reversed(range(TRIES)):
             answer = yield Ask(data, self.frames.end, timeout)
             text = self.frames.text(answer.data) if answer.whole else None
+            self._silent = self._silent or not answer.data
             if answer.data == data:  # no answer reads as a question does
                 self._unended = False
                 yield from self._quiet()
@@ -190,7 +194,13 @@ class Dialogue(Axis):
 
     def begins(self) -> None:
         """Something is begun: an error that the module keeps from here on is of this."""
-        self._begun, self._clean, self._owed = True, False, ""
+        self._begun, self._clean, self._owed, self._silent = True, False, "", False
+        self.otherwise()
+
+    def otherwise(self) -> None:
+        """It is told to do something else than to end where the last move was to: who waits for that learns of it."""
+        self._target = None
+        self._times_told += 1
 
     def fresh(self) -> Steps[None]:
         """Fetch an error that an old program may have left, so that it is not blamed on what is begun now (F)."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
 from detent.hosts.axis import Speeds
-from detent.hosts.errors import BadAnswer, Busy, DriverError, NoAnswer, Refused
+from detent.hosts.errors import BadAnswer, Busy, DriverError, MotionFailed, NoAnswer, Refused
 from detent.hosts.exchange import Asynchronous, Blocking, Progress, Steps, attempt, operation
 from detent.hosts.gsc200 import language
 from detent.hosts.gsc200.commands import Commands
@@ -49,16 +49,23 @@ class GsC200(Commands):
         yield from self._above(position)
         yield from self._at_slew()
         yield from self.go_to(position)
+        self._target = position
 
     @operation
     def move_by(self, steps: int) -> Steps[None]:
         """Begin a move by at most 999999 steps and return; by none, nothing is sent."""
         if steps:
             self._commanded()
+            target = None
             if abs(steps) in language.MOVES:
                 yield from self.fresh()
                 yield from self._at_slew()
+                here = yield from attempt(self.position())
+                if isinstance(here, DriverError) and not isinstance(here, Busy):  # which the move itself is told, too
+                    raise here
+                target = here + steps if isinstance(here, int) else None
             yield from self.move(steps)
+            self._target = target
 
     @operation
     def run_at(self, rate: float) -> Steps[None]:
@@ -91,6 +98,42 @@ class GsC200(Commands):
         if not self.programming:
             yield from self.fresh()
         yield from self.find_home(direction)
+
+    @operation
+    def wait(self, timeout: float | None = None) -> Steps[None]:
+        """Wait until the module is ready, for `timeout` seconds at most (None: as long as it takes).
+
+        Raises MotionFailed then, for an overflow, if a move ended elsewhere than it should have, and if the module was
+        silent on its way to 0 or home: it does not tell that its supply was lost, and begins anew with a counter of 0.
+        A stop by another thread ends the wait and is no failure.
+        """
+        homing = self._homing
+        yield from super().wait(timeout)
+        target, told = self._target, self._times_told
+        if (homing or target == 0) and self._silent:
+            self._target, self._silent = None, False
+            raise MotionFailed(
+                self.title,
+                "was silent for a while on its way: if its supply was lost it has begun anew, calls the place where it "
+                "stands 0, and has the speeds of power-on: home() and set_speeds() again",
+            )
+        if target is None:
+            return
+        try:
+            here = yield from self.position()
+        except Busy:
+            if self._times_told != told:
+                return  # with what it was told meanwhile
+            raise
+        if self._times_told != told:
+            return
+        self._target = None
+        if here != target:
+            why = "was it stopped otherwise?"
+            if here == 0:
+                why = "it was switched off and on, or cleared; then it has the speeds of power-on"
+                self.forget()
+            raise MotionFailed(self.title, f"stands at {here}, not at {target}: {why}")
 
     @operation
     def set_position(self, position: int) -> Steps[None]:
