@@ -194,3 +194,15 @@ def test_a_pipe_to_which_nobody_writes_is_not_waited_for(
         main(["motor", *words])
     assert ended.value.code in (1, 2)
     assert "it is a pipe, and nobody writes to it" in capsys.readouterr().err
+
+
+def test_settings_that_contradict_each_other_are_told_with_what_the_unit_makes_of_them(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = ["--move", "50", "--variants", "0", "--as", "dcb-274", "V=600"]
+    assert "V=600 is below I=8000: a dcb-274 makes no ramp then" in said(
+        capsys, "as1010", *words, "I=8000", "--inertia", "1e-5"
+    )
+    facts = json.loads(said(capsys, "as1010", *words, "I=8000", "--inertia", "1e-5", "--json"))
+    assert facts["remark"].startswith("V=600 is below")
+    assert "remark" not in json.loads(said(capsys, "as1010", *words, "I=60", "--inertia", "1e-5", "--json"))

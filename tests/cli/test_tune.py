@@ -13,6 +13,7 @@ import pytest
 
 from detent.cli import main
 from detent.cli import tune as verb
+from detent.motors import chance
 from detent.tuner import tune as tuning
 from detent.tuner.judge import Job, Judge, Lost
 from detent.tuner.search import Progress
@@ -111,6 +112,7 @@ def test_settings_are_compared_with_the_same_variants(capsys: pytest.CaptureFixt
              "--variants", "64"]  # fmt: skip
     gentle, rough = json.loads(run(capsys, *words, "--json"))["settings"]
     assert gentle["check"]["lost"] <= rough["check"]["lost"]
+    assert {row["check"]["looks"] for row in (gentle, rough)} == {2}
     assert gentle["torque_used"] < rough["torque_used"]
     assert gentle["moves"][1]["time_s"] > gentle["moves"][0]["time_s"]
     assert "torque used" in run(capsys, *words, "--plot", str(picture))
@@ -127,11 +129,13 @@ def test_a_batch_answers_row_by_row_and_a_row_without_answer_says_why(
     found, none = [json.loads(line) for line in run(capsys, *words, "--json").splitlines()]
     assert found["given"] == {"inertia": "1.5e-5", "friction": "0.02", "moves": "60"}
     assert (found["lost"], found["of"], found["problem"]) == (0, 32, "")
+    assert found["below"] == chance.bound(0, 32, looks=found["looks"])
     assert [line[0] for line in found["commands"]] == ["S", "T", "R"]
     assert "does not turn this load" in none["problem"]
     table = list(csv.DictReader(run(capsys, *words).splitlines()))
     assert [row["settings"] for row in table] == [found["settings"], ""]
     assert table[1]["problem"] == none["problem"]
+    assert [row["looks"] for row in table] == [str(found["looks"]), ""]
 
 
 def test_processes_that_share_the_work_take_no_gpu(capsys: pytest.CaptureFixture[str]) -> None:

@@ -40,6 +40,39 @@ def test_what_is_missing_or_wrong_is_one_line(words: list[str], told: str, capsy
     assert text.count("\n") == 1
 
 
+DCB = ["dcb-274", "--on", "/nowhere", "--moves", "300", "--travel", "4000", "--step", "half", "--begin"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["gs-c200", *BASE[1:], "--step", "half", "--travel", "400", "--begin", "S=60", "T=40", "R=300"],
+         "a harder R changes nothing: T=40 is below S=60: a gs-c200 makes no ramp then, and all steps at 400 steps/s"),
+        ([*DCB, "I=800", "V=60", "K=9"], "a harder K changes nothing: V=60 is below I=800"),
+        ([*DCB, "I=100", "V=2000", "K=0"], "K=0 is no ramp at all"),
+        ([*DCB, "I=100", "V=2000", "K=5,0"], "K=0 is no ramp at all"),
+        (["bs0610", *DCB[1:7], "--step", "1/16", "--axis", "X", "--begin", "K=900", "R=800", "P=100"],
+         "a harder P changes nothing: R=800 is below K=900"),
+    ],
+)  # fmt: skip
+def test_settings_in_which_nothing_can_be_made_harder_are_refused(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, text = said(words, capsys)
+    assert status == 2
+    assert told in text
+    assert text.count("\n") == 1
+
+
+def test_trials_that_set_both_ramps_alike_begin_with_the_gentler() -> None:
+    """K=5,9: 5 down, too, would be harder than what is known to be safe."""
+    from detent.moves.laws import law
+    from detent.tuner.machine.bench import knob_of
+
+    assert knob_of(law("dcb-274")).gentlest({"K up": 5, "K down": 9}) == 9
+    assert knob_of(law("bs0610", {}, "X")).gentlest({"P": 700}) == 700
+
+
 class TestLog:
     def test_what_is_written_is_read_again_and_a_torn_line_is_taken_off(self, tmp_path: Path) -> None:
         path = tmp_path / "log"

@@ -72,7 +72,7 @@ class TestCurves:
 
     @pytest.mark.parametrize(
         ("text", "words"),
-        [("", "no points"), ("1000,0.2\n", "names no units"), ("rpm,Nm\n100\n", "line 2: '100': a line has two"),
+        [("", "no points"), ("1000,0.2\n", "names no units"), ("rpm,Nm\n100\n", "line 2: '100': give two"),
          ("rpm,Nm\n1,x\n", "line 2: '1,x': give two numbers")],
     )  # fmt: skip
     def test_a_curve_that_is_none_is_refused_with_its_line(self, text: str, words: str) -> None:

@@ -1,5 +1,9 @@
 """Variants: the same verdicts as one by one, draws that can be made again, and what a count of losses proves."""
 
+import re
+from fractions import Fraction
+from math import comb, floor, log10
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,9 +16,21 @@ from detent.motors.load import Load, Profile
 from detent.motors.motor import MotorError
 from detent.motors.move import simulate
 from detent.motors.rotor import Rig
-from detent.motors.variants import SPREAD, Ensemble, LossRate, Spread, changed, corners, draws, loss_rate, percent
+from detent.motors.variants import (
+    SPREAD,
+    UNMET,
+    Ensemble,
+    LossRate,
+    Spread,
+    changed,
+    corners,
+    draws,
+    loss_rate,
+    percent,
+)
 from detent.motors.winding import HALF, microstep
 from detent.ramps.constant_acceleration import move
+from detent.tuner.search import Check
 
 compiled_only = pytest.mark.skipif(not engine.fast(), reason="numba is not installed")
 WIDE = SPREAD.changed({"inertia": (0.3, 6.0), "voltage": 0.5})
@@ -134,6 +150,46 @@ def test_a_margin_of_load_angle_is_not_one_of_losses() -> None:
     assert rate.corners_lost > 10
     assert rate == loss_rate(times, base, tried=128)
     assert f"lost by {rate.lost} of 128" in str(rate)
+
+
+@pytest.mark.parametrize("looks", [1, 2, 3, 6])
+@pytest.mark.parametrize(("tried", "lost"), [(2048, 0), (2048, 5), (512, 0), (512, 31), (59, 0), (32, 31), (10, 10)])
+def test_what_is_printed_of_a_rate_is_above_the_bound_of_all_its_looks_and_hardly(
+    tried: int, lost: int, looks: int
+) -> None:
+    """Each of k looks may be wrong once in 20 k times: in whole numbers, and from the words that people read."""
+
+    def at_most(rate: Fraction) -> Fraction:
+        """The chance of so few losses, exactly."""
+        ways = (comb(tried, k) * rate**k * (1 - rate) ** (tried - k) for k in range(lost + 1))
+        return sum(ways, Fraction())
+
+    for words in (
+        str(LossRate(lost, tried, 0, 128, 1, looks)),
+        str(Check(tried, lost, 128, 0, looks, 0)),
+    ):
+        found = re.search(r"(?:below|less than) ([\d.]+) %", words)
+        assert found is not None
+        shown = Fraction(found[1]) / 100
+        assert (f"{looks} looks counted" in words) is (looks > 1)
+        if lost == tried:
+            assert shown == 1
+            continue
+        part = Fraction(1, 20 * looks)
+        assert at_most(shown) <= part
+        digit = Fraction(1, 100) if shown >= Fraction(1, 10) else Fraction(10) ** (floor(log10(shown)) - 1)
+        assert at_most(shown - digit) > part  # the next lesser number with as many digits is none
+
+
+@compiled_only
+def test_what_is_judged_afterwards_has_not_been_met_by_a_search() -> None:
+    """A search of the same seed asked the first draws, and what it found survives them: they are no fresh ones."""
+    rig = Rig(LARGE, Drive(24, 1.0, HALF, "slow"), Load(LARGE.rotor))
+    pulses, spread = move(1000, 4500, 600, 6000).train, SPREAD.of(rig)
+    met = Ensemble(rig, draws(spread, 64, first=0)).judge(pulses).lost
+    fresh = Ensemble(rig, draws(spread, 64, first=UNMET)).judge(pulses).lost
+    assert loss_rate(pulses, rig, tried=64).lost == int(fresh.sum())
+    assert met.tolist() != fresh.tolist()
 
 
 def test_percent_rounds_a_bound_up() -> None:

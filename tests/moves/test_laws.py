@@ -168,3 +168,43 @@ def test_an_unknown_model_or_option_is_refused_with_the_likeliest_other() -> Non
 def test_an_axis_that_a_model_does_not_have_is_refused(model: str, axis: str, words: str) -> None:
     with pytest.raises(CatalogueError, match=words):
         laws.law(model, {}, axis)
+
+
+@settings(max_examples=15)
+@given(st.data())
+@pytest.mark.parametrize("model", ["gs-c200", "gs-c200s", "dcb-274", "bs0610", "supersigma"])
+def test_settings_that_contradict_each_other_are_said_to_and_made_as_said(model: str, data: st.DataObject) -> None:
+    """Out of range is one line; else the pulses are the unit's, and evenly spaced just where the words say no ramp."""
+    axis = "X" if model == "bs0610" else ""
+    law = laws.law(model, {}, axis)
+    fast = {"P": 62_500, "K up": 100, "K down": 100, "D": 4, "R": 800 if model == "bs0610" else 50}
+    wild = {}
+    for setting in law.settings:
+        top = fast.get(setting.name, setting.high)
+        least = max(setting.low, min(200, top // 8))
+        wild[setting.name] = data.draw(st.sampled_from([setting.low - 1, setting.high + 1, least, top])
+                                       | st.integers(least, top))  # fmt: skip
+    outside = [s.name for s in law.settings if not s.low <= wild[s.name] <= s.high]
+    words = spelled(law, wild).split()
+    if outside:
+        with pytest.raises(SettingError) as refused:
+            read(model, words, axis)
+        assert refused.value.args[0].count("\n") == 0
+        assert any(f": {name} takes " in refused.value.args[0] for name in outside)
+        return
+    law, values = read(model, words, axis)
+    assert values == wild
+    steps = data.draw(st.integers(3, 600))
+    same(law, values, steps, axis=axis)
+    gaps = np.diff(emulated(law, values, steps, axis=axis))
+    ends = {"gs-c200": ("S", "T"), "gs-c200s": ("S", "T"), "dcb-274": ("I", "V"), "bs0610": ("K", "R")}
+    remark = law.remark(values)
+    if model == "supersigma":
+        assert bool(remark) == (values["limit"] * 100 < 650)
+    else:
+        first, top_ = (values[name] for name in ends[model])
+        assert not (remark and first <= top_)
+        assert remark or first <= top_ or model == "dcb-274"  # whose timer makes one count of rates that are close
+    if remark:
+        tick = {"dcb-274": 8_036, "bs0610": 16_000, "supersigma": 500}.get(model, 1)
+        assert gaps.max() - gaps.min() <= tick

@@ -168,3 +168,12 @@ def test_what_moves_along_a_line_is_inertia_and_pull_at_the_shaft() -> None:
             await moves.motor(axis, FORM.model_copy(update={"drive": "tmc"}))
 
     with_bench("gs-c200", do)
+
+
+def test_a_move_without_the_ramp_that_was_meant_says_so() -> None:
+    async def do(moves: Moves, tuning: Tuning, live: Live) -> None:
+        axis = Axis(unit="gs-c200", values={"S": 60, "T": 40, "R": 60}, steps=300)
+        assert "makes no ramp" in str((await moves.move(axis))["remark"])
+        assert (await moves.move(axis.model_copy(update={"values": {"S": 40, "T": 60, "R": 60}})))["remark"] == ""
+
+    with_bench("gs-c200", do)

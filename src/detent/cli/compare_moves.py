@@ -94,6 +94,9 @@ def compare_moves(
         print(json_text.dumps({**about, "settings": facts}))
         return
     _print(task, rows)
+    for row in rows:
+        if row.remark:
+            print(f"\n{row.name}: {row.remark}", end="")
     if task.both_ways:
         print("\njudged in both directions, as the load pulls", end="")
     print("\nassumed: " + "; ".join(found.words))
@@ -107,8 +110,9 @@ def _facts(task: "Task", row: "Compared") -> dict[str, Any]:
         "settings": row.name,
         "moves": [{"steps": move.steps, "time_s": time} for move, time in zip(task.moves, row.times, strict=True)],
         "check": {"variants": check.variants, "lost": check.lost, "corners": check.corners,
-                  "corners_lost": check.corners_lost, "rate_below": check.bound},
-        "torque_used": row.most_used,
+                  "corners_lost": check.corners_lost, "looks": check.looks,
+                  "rate_below": check.bound},
+        "torque_used": row.most_used, **({"remark": row.remark} if row.remark else {}),
     }  # fmt: skip
 
 
@@ -120,7 +124,7 @@ def _print(task: "Task", rows: "list[Compared]") -> None:
     for k, move in enumerate(task.moves):
         table.add_row(f"{move.steps} steps", *(f"{row.times[k]:.4f} s" for row in rows))
     table.add_row("lost", *(f"{row.check.lost} of {row.check.variants}" for row in rows))
-    table.add_row("rate, at 95 %", *(f"below {percent(row.check.bound)}" for row in rows))
+    table.add_row(f"rate, at 95 %, {len(rows)} looks counted", *(f"below {percent(row.check.bound)}" for row in rows))
     table.add_row("corners lost", *(f"{row.check.corners_lost} of {row.check.corners}" for row in rows))
     table.add_row("torque used, at most", *(f"{row.most_used:.0%}" for row in rows))
     print_table(table)

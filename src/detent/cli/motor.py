@@ -291,6 +291,7 @@ class _Move(NamedTuple):
     train: "Train"
     steps: int
     words: str
+    remark: str = ""  # what the controller makes of settings that contradict each other
 
     @classmethod
     def of(
@@ -310,7 +311,8 @@ class _Move(NamedTuple):
             from detent.moves.spelling import spelled
 
             train = law.law.train(law.values, steps)
-            return cls(found, rig, train, steps, f"as {law.law.model} {spelled(law.law, law.values)}{_way(rig)}")
+            words = f"as {law.law.model} {spelled(law.law, law.values)}{_way(rig)}"
+            return cls(found, rig, train, steps, words, law.law.remark(law.values))
         top = _rate("--slew", SLEW if slew is None else slew)
         first = _default_start(rig, top) if start is None else _rate("--start", start)
         if first > top:
@@ -401,6 +403,8 @@ def _judge(
     verdict = run.verdict
     loss = diagnose(move.train, move.rig) if verdict.lost else None
     rate, why_not = many.judge(move)
+    if move.remark:
+        facts["remark"] = move.remark
     facts |= {"move": move.words, "pulses": run.pulses, "duration_s": duration * 1e-9, "verdict": _facts(verdict)}
     if loss is not None:
         facts["loss"] = loss._asdict()
@@ -423,6 +427,8 @@ def _judge(
         return
     _print_head(move.found, facts)
     print(f"{move.steps} steps in {duration * 1e-9:.4g} s, {move.words}:")
+    if move.remark:
+        print(f"  {move.remark}")
     print(f"  {_line(verdict, move.rig)}" if loss is None else f"  steps {loss}")
     print(f"  {rate}" if rate is not None else f"  {why_not}")
     if rate is not None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 100_000
 NAMED = ("motor", "moves")  # columns that are no options of the rig
-FOUND = ("settings", "seconds", "lost", "of", "below", "problem", "options")
+FOUND = ("settings", "seconds", "lost", "of", "below", "problem")  # the first fields of an `Answer`, by other names
 PARTS = 1000  # of a row, in the bar
 
 
@@ -67,17 +67,17 @@ class _Table:
         self._out, self._columns, self._json = out, columns, json
         self._write = csv.writer(out, lineterminator="\n")
         if not json:
-            self._write.writerow([*columns, *FOUND])
+            self._write.writerow([*columns, *FOUND, "options", "looks"])
 
     def add(self, row: dict[str, str], answer: "Answer") -> None:
         """What was found for a row."""
         if self._json:
             found = {**dict(zip(FOUND, answer, strict=False)), "options": dict(answer.options),
-                     "commands": list(answer.commands)}  # fmt: skip
+                     "commands": list(answer.commands), "looks": answer.looks}  # fmt: skip
             self._out.write(json_text.dumps({"given": row, **found}) + "\n")
         else:
             options = " ".join(f"{name}={value}" for name, value in answer.options.items())
-            self._write.writerow([*(row[name] for name in self._columns), *answer[: len(FOUND) - 1], options])
+            self._write.writerow([*(row[name] for name in self._columns), *answer[: len(FOUND)], options, answer.looks])
         self._out.flush()
 
 

@@ -190,7 +190,23 @@ def _room(law: "Law", step: str | None, machine: MachineOptions) -> "Room":
 def _plan(law: "Law", begin: "Values", moves: tuple[int, ...], room: "Room", machine: MachineOptions) -> "Plan":
     from detent.tuner.machine.session import Plan
 
-    return Plan(law, begin, moves, room, machine.trials, machine.confirm, machine.reserve)
+    plan = Plan(law, begin, moves, room, machine.trials, machine.confirm, machine.reserve)
+    _check_begin(plan)
+    return plan
+
+
+def _check_begin(plan: "Plan") -> None:
+    """Settings of which the knob changes nothing prove nothing. ValueError."""
+    from detent.moves.spelling import spelled
+    from detent.tuner.machine.bench import knob_of
+
+    law, begin, knob = plan.law, plan.begin, knob_of(plan.law)
+    if not all(knob.low <= begin[name] <= knob.high for name in knob.settings):
+        raise ValueError(f"--begin: {knob.name}=0 is no ramp at all: begin with a {knob.name} that makes a long one")
+    hardest = knob.set(begin, knob.low if knob.longer else knob.high)
+    if all(law.train(begin, steps).duration == law.train(hardest, steps).duration for steps in plan.moves):
+        why = law.remark(begin) or "these moves have no ramp, or it is as short as can be"
+        raise ValueError(f"--begin: with {spelled(law, begin)} a harder {knob.name} changes nothing: {why}")
 
 
 def _carried_out(
@@ -274,7 +290,8 @@ def _ask(plan: "Plan", bench: "Bench", machine: MachineOptions, *, quiet: bool) 
     print(
         f"  goes up to {room.travel} steps {way} from there, and {room.behind} behind it; back at {room.rate} steps/s"
     )
-    print(f"  begins with {spelled(plan.law, plan.begin)}, and makes {bench.knob.name} harder until a step is lost")
+    first = bench.knob.set(plan.begin, bench.knob.gentlest(plan.begin))
+    print(f"  begins with {spelled(plan.law, first)}, and makes {bench.knob.name} harder until a step is lost")
     if machine.yes or not sys.stdin.isatty():
         return
     print("  The carriage stands on the switch, and nobody is near it? Keep a hand on the switch of the supply.")
@@ -345,5 +362,6 @@ def _as_json(plan: "Plan", bench: "Bench", result: "Result", path: Path) -> None
     print(json.dumps({
         "model": plan.law.model, "knob": bench.knob.name, "good": result.found.good, "bad": result.found.bad,
         "settings": dict(result.shipped), "commands": [*commands.settings], "trials": result.trials,
-        "lost": result.lost, "confirmed": result.found.clean, "below": result.rate, "log": str(path),
+        "lost": result.lost, "confirmed": result.found.clean, "below": result.rate, "looks": result.found.looks,
+        "log": str(path),
     }))  # fmt: skip

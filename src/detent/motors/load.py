@@ -6,6 +6,7 @@ from itertools import pairwise
 from math import isfinite
 from typing import NamedTuple
 
+from detent.motors import columns
 from detent.motors.motor import MotorError, Shared, need
 
 
@@ -106,21 +107,18 @@ def read_profile(load: Load, text: str, file: str, radians: Mapping[str, float])
     MotorError names the line.
     """
     unit, points = "", []
-    for k, line in enumerate(text.splitlines(), 1):
-        words = line.partition("#")[0].strip()
-        parts = [part.strip() for part in words.replace(";", ",").replace("\t", ",").split(",")]
-        if not words:
-            continue
+    for k, words in columns.lines(text):
         if not unit:
+            parts = columns.parted(words)
             unit = parts[0].lower()
             if unit not in ("s", *radians) or len(parts) != 2 or parts[1].lower() != "nm":
                 known = ", ".join(f"'{name}, Nm'" for name in ("s", *radians))
                 raise MotorError(f"{file}, line {k}: {words!r}: begin with one of {known}")
             continue
         try:
-            place, torque = (float(part) for part in parts)
+            place, torque = columns.numbers(words)
         except ValueError:
-            raise MotorError(f"{file}, line {k}: {words!r}: give two numbers") from None
+            raise MotorError(f"{file}, line {k}: {words!r}: {columns.WANTED}") from None
         points.append((place * radians.get(unit, 1.0), torque))
         if len(points) > MOST_POINTS:
             raise MotorError(f"{file}: more than {MOST_POINTS} points")

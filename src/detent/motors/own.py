@@ -25,6 +25,7 @@ from math import inf, isfinite, pi
 from typing import Any, NamedTuple
 
 from detent import toml
+from detent.motors import columns
 from detent.motors.drive import Drive
 from detent.motors.fit import Fit, Point, fit_from_curve
 from detent.motors.motor import Motor, MotorError
@@ -137,16 +138,19 @@ def read_curve(text: str, file: str, *, step: str = "half", steps: int = 200) ->
     """The points (full steps/s, Nm) of a CSV text whose first line names the units of its two columns.
 
     Speeds: full steps/s, half steps/s, steps/s (of `step`), rpm, turns/s, rad/s. Torques: Nm, mNm, Ncm, kg cm, oz-in.
-    Columns are parted by comma, semicolon or tab; what follows # is a comment. MotorError names the line.
+    Columns as in `columns`. MotorError names the line.
     """
-    lines = [(k, line.partition("#")[0].strip()) for k, line in enumerate(text.lstrip("\ufeff").splitlines(), 1)]
-    lines = [(k, line) for k, line in lines if line]
-    if not lines:
-        raise MotorError(f"{file}: no points: write a line 'half steps/s, Nm', and a point a line below")
-    if len(lines) > MOST_POINTS:
-        raise MotorError(f"{file}: {len(lines)} points: give at most {MOST_POINTS}")
-    first, head = lines[0]
-    speed, torque = (_unit(word) for word in _parted(file, first, head))
+    found = columns.lines(text)
+    none = f"{file}: no points: write a line 'half steps/s, Nm', and a point a line below"
+    if not found:
+        raise MotorError(none)
+    if len(found) > MOST_POINTS:
+        raise MotorError(f"{file}: {len(found)} points: give at most {MOST_POINTS}")
+    first, head = found[0]
+    units = columns.parted(head)
+    if len(units) != 2:
+        raise MotorError(f"{file}, line {first}: {head!r}: a line has two columns, speed and torque")
+    speed, torque = map(_unit, units)
     factors = {**_SPEEDS, **{unit: value * steps for unit, value in _TURNS.items()}}
     factors |= dict.fromkeys(_STEPS, 1 / winding(step).steps)
     if speed not in factors or torque not in _TORQUES:
@@ -154,24 +158,16 @@ def read_curve(text: str, file: str, *, step: str = "half", steps: int = 200) ->
             f"{file}, line {first}: {head!r} names no units: begin with a line like 'half steps/s, Nm'; speeds: "
             f"{', '.join(factors)}; torques: Nm, mNm, Ncm, kg cm, oz-in"
         )
+    if len(found) == 1:
+        raise MotorError(none)
     points = []
-    for k, line in lines[1:]:
+    for k, line in found[1:]:
         try:
-            rate, value = (float(part) for part in _parted(file, k, line))
-        except ValueError as error:
-            raise MotorError(str(error) if isinstance(error, MotorError) else f"{file}, line {k}: {line!r}: give two "
-                             "numbers") from None  # fmt: skip
+            rate, value = columns.numbers(line)
+        except ValueError:
+            raise MotorError(f"{file}, line {k}: {line!r}: {columns.WANTED}") from None
         points.append((rate * factors[speed], value * _TORQUES[torque]))
     return tuple(points)
-
-
-def _parted(file: str, number: int, line: str) -> list[str]:
-    for mark in (";", "\t", ","):
-        if mark in line:
-            parts = [part.strip().strip('"') for part in line.split(mark)]
-            if len(parts) == 2:
-                return parts
-    raise MotorError(f"{file}, line {number}: {line!r}: a line has two columns, speed and torque")
 
 
 def _unit(word: str) -> str:

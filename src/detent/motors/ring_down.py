@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from detent.motors import columns
 from detent.motors import damping as damping_
 from detent.motors.damping import Damping, given
 from detent.motors.fit import best_of
@@ -174,17 +175,13 @@ def read(text: str, file: str) -> tuple[list[float], list[float]]:
     """Times and places of a CSV text, seconds first; a first line of words is left out. MotorError names the line."""
     times: list[float] = []
     places: list[float] = []
-    for k, line in enumerate(text.lstrip("\ufeff").splitlines(), 1):
-        words = line.partition("#")[0].replace(";", ",").replace("\t", ",").strip()
-        if not words:
-            continue
-        parts = [part.strip() for part in words.split(",")]
+    for row, (k, line) in enumerate(columns.lines(text)):
         try:
-            t, x = (float(part) for part in parts)
+            t, x = columns.numbers(line)
         except ValueError:
-            if not times and k == 1:
+            if not row and line.lstrip('"')[:1].isalpha():
                 continue
-            raise MotorError(f"{file}, line {k}: {line!r}: give two numbers, seconds and the place") from None
+            raise MotorError(f"{file}, line {k}: {line!r}: seconds and the place: {columns.WANTED}") from None
         times.append(t)
         places.append(x)
         if len(times) > MOST_POINTS * 100:

@@ -21,6 +21,8 @@ from detent.ticks import Ns
 
 QUANTITIES = ("inertia", "voltage", "torque_constant", "inductance", "resistance", "friction", "damping", "load")
 """What varies: the columns of the factors."""
+UNMET = 1 << 40
+"""The number of the first draw of a seed that no search asks: those that it asked prove nothing of what it found."""
 KEPT_PULSES = 1 << 22  # a train of fewer is turned into changes once, for all variants
 FIRST_BLOCK = 64  # lanes that `survives` looks at first
 Bools = npt.NDArray[np.bool_]
@@ -195,8 +197,9 @@ class LossRate(NamedTuple):
         return chance.bound(self.lost, self.tried, looks=self.looks)
 
     def __str__(self) -> str:
+        looks = "" if self.looks == 1 else f", {self.looks} looks counted"
         return (
-            f"lost by {self.lost} of {self.tried} variants (below {percent(self.bound)} at 95 % confidence) and "
+            f"lost by {self.lost} of {self.tried} variants (below {percent(self.bound)} at 95 % confidence{looks}) and "
             f"by {self.corners_lost} of {self.corners} corners"
         )
 
@@ -212,7 +215,7 @@ def percent(part: float) -> str:
 
 def loss_rate(
     pulses: Pulses, rig: Rig, *, spread: Spread = SPREAD, tried: int = 512, seed: int = 1, settle: Ns = SETTLE,
-    first: int = 0, looks: int = 1,
+    first: int = UNMET, looks: int = 1,
 ) -> LossRate:  # fmt: skip
     """How often the move is lost by variants of the rig: `tried` draws from `first` on, and all corners."""
     spread = spread.of(rig)

@@ -32,6 +32,15 @@ def law(found: catalogue.Model, _: Mapping[str, object], axis: str) -> Law:
         ramp = f"K {values['K up']} {values['K down']}"
         return Commands((f"I {values['I']}", f"V {values['V']}", ramp, f"D {values['D']}"), f"+ {steps}")
 
+    def remark(values: Values) -> str:
+        initial, slew = values["I"], values["V"]
+        if timer_table.count_of(initial) >= timer_table.count_of(slew):
+            return ""
+        return (
+            f"V={slew} is below I={initial}: a {found.name} makes no ramp then, and all steps at {slew} steps/s, "
+            "divided by D"
+        )
+
     return Law(
         found.name, "table of speeds of an 8 036 ns timer", "steps", dcb274.ROWS[dcb274.Op.PLUS].arguments[0].high,
         (
@@ -41,5 +50,5 @@ def law(found: catalogue.Model, _: Mapping[str, object], axis: str) -> Law:
             Setting("K down", "ramp down, steps each", "steps", down.low, down.high, factory.ramp[1]),
             Setting("D", "speeds divided by", "", divide.low, divide.high, factory.divide),
         ),
-        train, commands, tuple(sorted(DCB_274, key=lambda winding: winding.name != FACTORY_STEP)),
+        train, commands, tuple(sorted(DCB_274, key=lambda winding: winding.name != FACTORY_STEP)), remark,
     )  # fmt: skip

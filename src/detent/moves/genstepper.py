@@ -30,6 +30,12 @@ def law(found: catalogue.Model, chosen: Mapping[str, object], axis: str) -> Law:
     def rate(op: genstepper.Op, title: str, unit: str, option: str) -> Setting:
         return Setting(op.value, title, unit, 1, tick_accumulator.UPDATES, after_reset[option])
 
+    def remark(values: Values) -> str:
+        keep, run = values["K"], values["R"]
+        if keep <= run:
+            return ""
+        return f"R={run} is below K={keep}: a {found.name} makes no ramp then, and all steps at {run} microsteps/s"
+
     size = after_reset["step_size"]
     return Law(
         found.name, "speed and position added up every 16 us", "microsteps", LARGEST,
@@ -38,7 +44,7 @@ def law(found: catalogue.Model, chosen: Mapping[str, object], axis: str) -> Law:
             rate(genstepper.Op.RATE, "run rate", "microsteps/s", "run_rate"),
             rate(genstepper.Op.SLOPE, "slope of the ramps", "microsteps/s\N{SUPERSCRIPT TWO}", "ramp"),
         ),
-        train, commands, _windings(size),
+        train, commands, _windings(size), remark,
     )  # fmt: skip
 
 

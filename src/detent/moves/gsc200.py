@@ -29,6 +29,13 @@ def law(found: catalogue.Model, _: Mapping[str, object], axis: str) -> Law:
         lines = (gsc200.spell(found.name, gsc200.Instruction(op, values[op.value])) for op in ops)
         return Commands(tuple(lines), gsc200.spell(found.name, gsc200.Instruction(gsc200.Op.MOVE, steps)))
 
+    def remark(values: Values) -> str:
+        start, top = values["S"], values["T"]
+        if start <= top:
+            return ""
+        rate = STEPS_PER_SECOND * top
+        return f"T={top} is below S={start}: a {found.name} makes no ramp then, and all steps at {rate} steps/s"
+
     move = gsc200.row(found.name, gsc200.Op.MOVE).argument
     assert isinstance(move, Signed)
     return Law(
@@ -38,5 +45,5 @@ def law(found: catalogue.Model, _: Mapping[str, object], axis: str) -> Law:
             number(gsc200.Op.TOP, "slew speed", "steps/s", 100, STEPS_PER_SECOND),
             number(gsc200.Op.RAMP, "ramp length", "steps", 40),
         ),
-        train, commands, ANY_DRIVE,
+        train, commands, ANY_DRIVE, remark,
     )  # fmt: skip

@@ -32,8 +32,15 @@ class Commands(NamedTuple):
     go: str
 
 
+def _nothing(_: Values) -> str:
+    return ""
+
+
 class Law(NamedTuple):
-    """How one controller makes moves. `train` and `commands` take the settings by name, and steps (1 to `most`)."""
+    """How one controller makes moves. `train` and `commands` take the settings by name, and steps (1 to `most`).
+
+    `remark` says what it makes of settings that contradict each other, which none of them refuses; "" where none do.
+    """
 
     model: str
     title: str
@@ -43,6 +50,7 @@ class Law(NamedTuple):
     train: Callable[[Values, int], Train]
     commands: Callable[[Values, int], Commands]
     windings: tuple[Winding, ...]  # what one pulse may turn the field by; the first is the usual one. None: unknown
+    remark: Callable[[Values], str] = _nothing
 
     @property
     def values(self) -> dict[str, int]:

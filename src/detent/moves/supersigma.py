@@ -8,6 +8,7 @@ from detent.controllers.supersigma.program import Program
 from detent.motors.winding import HALF
 from detent.moves.law import Commands, Law, Setting, Values
 from detent.pulses import Train
+from detent.ramps.rate_generator import CLOCK_HZ
 from detent.ramps.short_movements import movement
 
 
@@ -31,10 +32,16 @@ def of_program(program: Program, model: str = "supersigma") -> Law:
             supersigma.Op.LIMIT, 1, steps, values["limit"])  # fmt: skip
         return Commands((), supersigma.spell(command))
 
+    def remark(values: Values) -> str:
+        limit, low = values["limit"] * supersigma.SPEED_UNIT, CLOCK_HZ / (program.table.first + 1)
+        if limit >= low:
+            return ""
+        return f"{limit} half steps/s is below the begin of the table: a {model} makes all steps at {low:.0f} then"
+
     title = f"table of {len(program.table.differences)} differences; short movements: {program.short.value}"
     limit = Setting("limit", "speed limit", "half steps/s", 1, most, most, supersigma.SPEED_UNIT)
     return Law(model, title, "half steps", supersigma.LARGEST_STEPS, (limit,), train, commands,
-               (HALF,))  # fmt: skip
+               (HALF,), remark)  # fmt: skip
 
 
 def _fastest(program: Program) -> float:

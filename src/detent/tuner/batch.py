@@ -18,6 +18,7 @@ class Answer(NamedTuple):
     problem: str = ""
     commands: tuple[str, ...] = ()
     options: Mapping[str, str] = {}  # that no command sets
+    looks: int | None = None  # that `below` counts
 
 
 def answers(_: object, tasks: Sequence[Task]) -> list[Answer]:
@@ -33,4 +34,4 @@ def answer(task: Task, watch: Watch = nobody) -> Answer:
         return Answer(problem=str(error))
     check, profile = found.check, found.profile
     return Answer(str(profile), round(found.time, 9), check.lost, check.variants, check.bound, "", profile.settings,
-                  dict(profile.options))  # fmt: skip
+                  dict(profile.options), check.looks)  # fmt: skip

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from detent.motors.rotor import Floats
-from detent.motors.variants import Ensemble
+from detent.motors.variants import UNMET, Ensemble
 from detent.moves.law import Law, Values
 from detent.pulses import Train
 from detent.tuner.judge import ways_of
@@ -31,17 +31,18 @@ class Compared(NamedTuple):
     at: Floats
     speeds: Floats
     used: Floats
+    remark: str = ""  # what the controller makes of settings that contradict each other
 
 
 def compare(task: Task, settings: Sequence[tuple[str, Law, Values]]) -> list[Compared]:
     """Settings with their names, in the order given. The same draws, and all corners, judge each of them.
 
-    There and back, where the load pulls to one side.
+    There and back, where the load pulls to one side. Each is a look, so that all bounds hold together.
     """
     torque = torque_of(task.rig)
     rig = task.rig_with(task.rig.drive.winding, fine=True)
     corners = Ensemble(rig, task.factors(task.corners)) if task.corners else None
-    drawn = Ensemble(rig, task.factors(task.drawn(0, task.final)))
+    drawn = Ensemble(rig, task.factors(task.drawn(UNMET, task.final)))
     found = []
     for name, law, values in settings:
         trains = [law.train(values, move.steps) for move in task.moves]
@@ -51,11 +52,12 @@ def compare(task: Task, settings: Sequence[tuple[str, Law, Values]]) -> list[Com
             lost |= drawn.judge(pulses).lost
             if corners is not None:
                 corners_lost |= corners.judge(pulses).lost
-        check = Check(len(lost), int(lost.sum()), len(corners_lost), int(corners_lost.sum()), 1, 0)
+        check = Check(len(lost), int(lost.sum()), len(corners_lost), int(corners_lost.sum()), len(settings), 0)
         longest = max(trains, key=lambda train: train.steps or 0)
         at, speeds, used = torque_used(longest, torque)
         times = tuple((train.duration or 0) * 1e-9 for train in trains)
-        found.append(Compared(name, times, check, float(np.abs(used).max()), at, speeds, used))
+        found.append(Compared(name, times, check, float(np.abs(used).max()), at, speeds, used,
+                              law.remark(values)))  # fmt: skip
     return found
 
 

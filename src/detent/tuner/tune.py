@@ -8,7 +8,7 @@ import numpy as np
 
 from detent.motors.drive import Decay
 from detent.motors.motor import MotorError
-from detent.motors.variants import QUANTITIES, Ensemble
+from detent.motors.variants import QUANTITIES, UNMET, Ensemble
 from detent.motors.winding import HALF, HALF_COMPENSATED
 from detent.tuner.judge import Job, Judge, Runner, judge_of, one_by_one, weighed
 from detent.tuner.quasi_static import Bound, bound
@@ -158,7 +158,7 @@ def models(judge: Judge, point: Point) -> tuple[Model, ...]:
     for name, change in changes:
         with suppress(MotorError):  # such a model is none of this rig: its supply does not drive that current
             others.append((name, replace(rig, **change)))
-    factors = task.factors(task.drawn(0, MODEL_VARIANTS))
+    factors = task.factors(task.drawn(UNMET, MODEL_VARIANTS))  # those of the search have been survived
     return tuple(Model(name, MODEL_VARIANTS, int(_lost(judge, point, Ensemble(other, factors)).sum()))
                  for name, other in others)  # fmt: skip
 

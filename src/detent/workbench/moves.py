@@ -138,6 +138,7 @@ class Moves:
                                                                          strict=True)],
             "duration": drawn.duration, "peak": round(drawn.peak, 3), "mean": round(drawn.mean, 3),
             "up": drawn.ramps[0], "down": drawn.duration * 1e-9 - drawn.ramps[1], "reached": drawn.reached,
+            "remark": law.remark(values),
             "settings": list(commands.settings), "go": commands.go,
         }  # fmt: skip
 

@@ -93,6 +93,7 @@ interface Move {
   up: number;
   down: number;
   reached: boolean;
+  remark: string;
 }
 
 type Point = [number, number];

@@ -37,6 +37,11 @@ class Knob(NamedTuple):
         """The settings with the knob at `number`."""
         return {**values, **dict.fromkeys(self.settings, number)}
 
+    def gentlest(self, values: Values) -> int:
+        """The number that is no harder than any of the settings: as trials set all of them alike."""
+        numbers = [values[name] for name in self.settings]
+        return max(numbers) if self.longer else min(numbers)
+
     def harder(self, number: int, factor: float) -> int:
         """The number that is harder by a factor above 1 (gentler below 1), within what the command takes."""
         wanted = number / factor if self.longer else number * factor

@@ -57,8 +57,14 @@ class Plan:
 
     def recipe(self, bench: Bench) -> Recipe:
         """The trials, from the beginning."""
-        number = self.begin[bench.knob.settings[0]]
-        return recipe(bench.knob, number, self.moves, trials=self.trials, confirm=self.confirm, reserve=self.reserve)
+        return recipe(
+            bench.knob,
+            bench.knob.gentlest(self.begin),
+            self.moves,
+            trials=self.trials,
+            confirm=self.confirm,
+            reserve=self.reserve,
+        )
 
 
 @dataclass(frozen=True)

@@ -348,9 +348,10 @@ export class Motion {
     };
     for (const [name, text] of Object.entries(facts)) this.find(`[data-fact=${name}]`).textContent = text;
     const peak = this.find("[data-fact=peak]");
-    peak.title = move.reached ? "" : "the move is too short for the slew speed";
-    if (!move.reached) peak.textContent += " (too short for the slew speed)";
-    peak.classList.toggle("short", !move.reached);
+    peak.title = move.remark || (move.reached ? "" : "the move is too short for the slew speed");
+    if (move.remark) peak.textContent += " (no ramp)";
+    else if (!move.reached) peak.textContent += " (too short for the slew speed)";
+    peak.classList.toggle("short", !move.reached || !!move.remark);
   }
 
   /* A and this move, row by row. */
