@@ -1,8 +1,5 @@
 """A service with real pins: what it opens, refuses, tells, and what `detent control` does to it."""
 
-import os
-import sys
-import threading
 from collections.abc import Iterator
 
 import pytest
@@ -11,7 +8,7 @@ from tests.realtime.served import no_file
 
 from detent.cell.build import build
 from detent.cell.description import Problem, parse
-from detent.realtime.boards.drive import RealPins, take_priority
+from detent.realtime.boards.drive import RealPins
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.chips import Chip
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
@@ -250,30 +247,6 @@ def test_a_mushroom_button_in_the_supply_of_the_motors_is_told_and_recover_sets_
         run(service, wall, 1 * SECOND)
         assert machine.axes["x"].position == place + 10
     assert [item.weight.value for item in news if item.weight.value != "note"] == ["fault", "warning"], news
-
-
-def test_every_thread_gets_real_time_priority(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One that has Python's lock and no turn of its own would keep the one that gives steps waiting."""
-    asked: list[int] = []
-    monkeypatch.setattr(os, "sched_setscheduler", lambda task, *_: asked.append(task))
-    end = threading.Event()
-    other = threading.Thread(target=end.wait)
-    other.start()
-    try:
-        assert take_priority() == ""
-        assert set(asked) >= {other.native_id, threading.get_native_id()}
-    finally:
-        end.set()
-        other.join()
-
-
-def test_no_thread_keeps_a_cell_with_real_pins_from_its_turn_for_long() -> None:
-    before = sys.getswitchinterval()
-    service, wall, _ = made(CELL)
-    with service:
-        run(service, wall, 100 * MS)
-        assert sys.getswitchinterval() <= 0.001
-    assert sys.getswitchinterval() == before
 
 
 MACHINE = """

@@ -1,10 +1,7 @@
 """A cell file with real pins, from opening its boards to letting go of them: what a service needs of all this."""
 
-import contextlib
 import gc
 import os
-import sys
-import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -25,12 +22,12 @@ from detent.realtime.boards.several import Boards
 from detent.realtime.boards.stages import stages
 from detent.realtime.boards.states import News
 from detent.realtime.boards.stepper import LONGEST
+from detent.realtime.boards.warming import first_moves
 from detent.realtime.pace import Pace, WallNs
 from detent.ticks import MS, SECOND, Ns
 
 ENDING: WallNs = SECOND  # for the last steps to leave, and for boards to hear of the end; each
 PAUSE: WallNs = 5 * MS
-TURN = 0.0005  # seconds that another thread (of `--control`) may go on when the one that gives steps wants to
 PRIORITY = 20  # of the real-time class: above most, below what the system keeps for itself
 
 
@@ -57,7 +54,6 @@ class Opened:
         `least_lead` is for whoever has time: a busy computer is not late then.
         """
         self._real = real
-        self._turn: float | None = None  # of threads, before it was ours
         trial = build(described, read)
         self.plan: Plan = plan(described, trial.controllers(), least_lead)
         self.stages = stages(self.plan, trial)
@@ -67,6 +63,7 @@ class Opened:
             self._levels: dict[str, Level] = make_ready(self.boards, self.plan, real.wall, real.sleep)
             set_drivers(self.boards, self.plan, self.stages, real.wall, real.sleep)
             _warm_up(self.plan.setups[0][0].error)
+            first_moves(described)
         except BaseException:
             self.boards.close()
             raise
@@ -93,8 +90,6 @@ class Opened:
     def begin(self, driven: Driven, pace: Pace) -> None:
         """The cell's present is now; from here on pulses leave."""
         driven.on_moving = _no_collection_while
-        self._turn = sys.getswitchinterval()
-        sys.setswitchinterval(TURN)
         driven.begin(pace, self._levels)
 
     def end(self, driven: Driven) -> None:
@@ -107,8 +102,6 @@ class Opened:
         driven.close()
         self._until(lambda: self.boards.quiet)
         self.boards.close()
-        if self._turn is not None:
-            sys.setswitchinterval(self._turn)
 
     def _until(self, done: Callable[[], bool]) -> None:
         begun = self._real.wall()
@@ -133,15 +126,9 @@ def _no_collection_while(moving: bool) -> None:
 
 
 def take_priority() -> str:
-    """Ask for real-time priority for this process; why not, if it may not, with the remedy, else nothing.
-
-    All its threads get it, as those that they start will: one that waits for its turn while it has Python's lock keeps
-    the others from theirs.
-    """
+    """Ask for real-time priority for this process; why not, if it may not, with the remedy, else nothing."""
     try:
-        for thread in threading.enumerate():
-            with contextlib.suppress(ProcessLookupError):  # it has just ended
-                os.sched_setscheduler(thread.native_id or 0, os.SCHED_RR, os.sched_param(PRIORITY))
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(PRIORITY))
     except PermissionError:
         return (
             "real-time priority is not allowed to this user: LimitRTPRIO=95 in its systemd unit, or "
