@@ -1,7 +1,7 @@
 """The state of a cell as the table that windows show (see `live`), and the actions that windows may do to it.
 
-Keys: ``now begin end pace held why past faster late dropped marks crashed title queue control faults branches``; of
-real pins ``real`` (driven, fault, None) ``realwhy slips``; for each unit ``u.UNIT.`` and
+Keys: ``now begin end pace held why past faster late dropped marks crashed silent title queue control faults branches``;
+of real pins ``real`` (driven, fault, None) ``realwhy slips``; for each unit ``u.UNIT.`` and
 ``powered state address running error errorat hand reg unsaved stored memory pin.PIN x.AXIS.position|shaft|pulses|rate``
 (a single axis has no name: ``x..position``); for each switch ``s.SWITCH.`` and ``level low high``; for each motor
 ``m.MOTOR.`` and ``place command speed lost``; for each line ``l.LINE.format``. Times are in ns,
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 PACES: Sequence[float | None] = (0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, None)
 """The notches of the pace, times real time; None: as fast as it goes."""
 
+SILENT = 4.0
+"""Seconds without a word of the cell's process, after which a person is told."""
+
 IDLE = "nothing is due: at max, time stands until something is"
 
 LevelField = Annotated[Level, Field(ge=0, le=1)]
@@ -43,6 +46,18 @@ class Board:
         self.renew()
         bench.on_change(self.renew)
         _offer(bench, live)
+        self._hearing = asyncio.get_running_loop().create_task(self._hear())
+
+    async def _hear(self) -> None:
+        """Show for how many seconds the process of the cell has said nothing, once that is longer than it should."""
+        before = 0.0
+        while True:
+            await asyncio.sleep(1.0)
+            silent = self._bench.silent
+            # twice in a row: this process may have been away itself, and not have read yet what was said
+            long = min(silent, before + 1.0) > SILENT
+            before = silent
+            self._live.put({"silent": round(silent) if long else None})
 
     def renew(self) -> None:
         """Show what the bench knows now."""
@@ -210,7 +225,13 @@ def _offer(bench: "Bench", live: Live) -> None:
     async def revive() -> None:
         await bench.revive()
 
+    async def end_silent() -> None:
+        """End a process of the cell that says nothing; what was done is done again by the next one."""
+        if bench.silent > SILENT and bench.state.real is None:
+            await bench.kill()
+            await bench.revive()
+
     for action in (pace, faster, slower, step_instruction, step_back, rewind, power, set_switch, set_pin, set_strap,
                  place_switch, send, type, withdraw, start, break_on_errors, hold, go, step_event, breaks, mend,
-                 take_branch, compare_branch, restart, stop_motors, recover, revive):  # fmt: skip
+                 take_branch, compare_branch, restart, stop_motors, recover, revive, end_silent):  # fmt: skip
         live.offer(action.__name__, action)

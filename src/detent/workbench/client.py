@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import pickle
 import sys
+import time
 from asyncio.subprocess import Process
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -26,7 +27,6 @@ from detent.workbench import exports, joining
 from detent.workbench.messages import (
     Answer,
     Ask,
-    EndpointPicture,
     Failed,
     Fault,
     Happened,
@@ -117,6 +117,7 @@ class Bench:
         self.crashed = None
         self.cut = 0
         self._order = order
+        self._heard = time.monotonic()
         self._process: Process | None = None
         self._writer: asyncio.StreamWriter | None = None
         self._reader: asyncio.Task[None] | None = None
@@ -187,7 +188,15 @@ class Bench:
         self._waiting.clear()
         self._call_back()
 
+    @property
+    def silent(self) -> float:
+        """Seconds since the engine should have said something: time goes, or it was asked. 0.0 while all is well."""
+        due = bool(self._asked) or not self.state.held
+        there = self.engine_pid is not None and not self._opening.locked()
+        return time.monotonic() - self._heard if due and there else 0.0
+
     def _take(self, message: object) -> None:
+        self._heard = time.monotonic()
         match message:
             case Happened():
                 self._mirror.take(message)
@@ -239,13 +248,15 @@ class Bench:
         """Have a verb of the engine done. Raises BenchError."""
         if self._writer is None or self._reader is None or self._reader.done():
             raise BenchError(self.crashed or "the workbench is closed")
+        if not self._asked:
+            self._heard = time.monotonic()
         self._number += 1
         future = asyncio.get_running_loop().create_future()
         self._asked[self._number] = future
         self._writer.write(packed(Ask(self._number, verb, arguments)))
         return await future
 
-    async def _kill(self) -> None:
+    async def kill(self) -> None:
         """End an engine that does not answer; whoever waits for it is told."""
         process, reader = self._process, self._reader
         if process is not None and process.returncode is None:
@@ -467,7 +478,7 @@ class Bench:
         try:
             await asyncio.wait_for(self._ask("stop_motors"), STOP_SECONDS)
         except TimeoutError:
-            await self._kill()
+            await self.kill()
             raise BenchError(f"the process that drives the boards did not answer within {STOP_SECONDS:g} s "
                              f"and was ended: {UNDRIVEN}") from None  # fmt: skip
         except BenchError as error:
@@ -497,7 +508,7 @@ class Bench:
         mirror, end = self._mirror, self.state.end
         actions, until = (tuple(mirror.actions), end) if mirror.complete else (tuple(mirror.loaded.values()), 0)
         self._asked.clear()
-        placed = {name: tuple(map(_again, line.endpoints)) for name, line in self.picture.lines.items()}
+        placed = {name: tuple(end.again for end in line.endpoints) for name, line in self.picture.lines.items()}
         for spec in (one for several in placed.values() for one in several):
             if spec.kind == "pty" and spec.where and Path(spec.where).is_symlink():
                 Path(spec.where).unlink()  # of the one that is gone; its terminal may be another's by now
@@ -586,9 +597,3 @@ class Bench:
     def program(self, unit: str) -> Program:
         """What an editor must know of the unit's language. KeyError for an unknown unit, ValueError for a part."""
         return Program(self.picture.units[unit].model)
-
-
-def _again(endpoint: EndpointPicture) -> EndpointSpec:
-    """The same endpoint once more; a pseudo-terminal without a link has another name each time."""
-    bare = endpoint.kind == "pty" and endpoint.address.startswith("/dev/pts/")
-    return EndpointSpec(endpoint.kind, "" if bare else endpoint.address)

@@ -101,6 +101,12 @@ class EndpointPicture(NamedTuple):
     kind: str  # pty, tcp, serial
     address: str
 
+    @property
+    def again(self) -> EndpointSpec:
+        """The same endpoint once more; a pseudo-terminal without a link has another name each time."""
+        bare = self.kind == "pty" and self.address.startswith("/dev/pts/")
+        return EndpointSpec(self.kind, "" if bare else self.address)
+
 
 class LinePicture(NamedTuple):
     """A serial line."""

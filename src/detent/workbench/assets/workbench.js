@@ -500,6 +500,7 @@ followTabs();
 on("real", (key, value) => {
   if (key === "real") document.documentElement.dataset.real = value ?? "";
 });
+on("silent", (key, value) => (document.documentElement.dataset.silent = value ? "yes" : ""));
 on("crashed", (key, value) => (document.documentElement.dataset.crashed = value ? "yes" : ""));
 on("title", (key, value) => {
   document.documentElement.dataset.title = value;
