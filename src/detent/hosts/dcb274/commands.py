@@ -12,13 +12,8 @@ from detent.hosts.dcb274.answers import Inputs, JogInputs, Ports, Settings
 from detent.hosts.dcb274.handshake import SingleMode
 from detent.hosts.dcb274.ranges import LARGEST_ADDRESS, MOST_STEPS, between, place, program_address, sign, speed
 from detent.hosts.dcb274.unit import CLEARING, SAVING, Unit
-<<<<<<< HEAD
-from detent.hosts.errors import BadAnswer
-from detent.hosts.exchange import Ask, Rest, Steps, operation
-=======
 from detent.hosts.errors import BadAnswer, DriverError
-from detent.hosts.exchange import Ask, Rest, Steps, attempt, operation
->>>>>>> 79e8a79 (A supply that is lost in a call is told by every driver, and the next call works; a generated law holds them to it)
+from detent.hosts.exchange import Ask, Rest, Steps, operation
 
 CELLS_AT_ONCE: Final = 32  # bytes of one [: the answer fits into the buffer of a SIN-10
 READ_BACK: Final = 128  # the flag of l that reads, and with 1 of A

@@ -247,17 +247,13 @@ class SingleMode(Handshake):
                 raise BadAnswer(self.title, ECHOES, Spoken(b"@\r", b"@\r"))
             heard, known, wrong = answer.data, False, wrong + 1
             if wrong >= TRIES:
-<<<<<<< HEAD
                 break
         spoken = Spoken(b"@\r", heard)
         if others or wrong:
             what = "answers its stop command with something else; it was told to stop, and may still move"
             raise BadAnswer(self.title, what, spoken, "abort() sends ESC")
-=======
-                raise BadAnswer(self.title, "answers its stop command with something else", Spoken(b"@\r", heard))
         if (yield from self.signs_on()):
-            raise NoAnswer(self.title, RESET, Spoken(b"@", heard))
->>>>>>> 79e8a79 (A supply that is lost in a call is told by every driver, and the next call works; a generated law holds them to it)
+            raise NoAnswer(self.title, RESET, spoken)
         what = "does not take its stop command: it is off, or the line is broken"
         raise NoAnswer(self.title, what, spoken, "abort() sends ESC")
 
