@@ -1,4 +1,7 @@
+import contextlib
 import json
+import socket
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -7,6 +10,7 @@ import pytest
 from tests.cli.test_serve import ask, end, facts, start
 from tests.realtime.controlled import controlled, slide
 
+from detent.cli import control as verb
 from detent.cli import main
 from detent.cli.control import placed, usage
 from detent.realtime import verbs
@@ -217,3 +221,50 @@ def test_a_token_that_no_request_can_carry_is_told_as_such(
     status, _, err = run(capsys, url, "--token", token)
     assert status == 2
     assert err == "detent: the token has characters that no request can have; give the one of serve\n"
+
+
+# -- who is no service ---------------------------------------------------------------------------------------------
+
+HEAD = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n"
+STRANGERS = {
+    "is silent": [],
+    "speaks a byte at a time": [HEAD + b"Content-Length: 9999\r\n\r\n", *[b"["] * 9999],
+    "never ends its head": [HEAD, *[b"x"] * 9999],
+    "has no end": [HEAD + b"\r\n", *[b"[" * 65_536] * 99],
+    "nests": [HEAD + b"Content-Length: 90000\r\n\r\n", b"[" * 90_000],
+    "tells something else": [HEAD + b'Content-Length: 12\r\n\r\n{"units": 5}'],
+    "tells less": [HEAD + b'Content-Length: 13\r\n\r\n{"units": {}}'],
+    "leads elsewhere": [b"HTTP/1.1 302 Found\r\nLocation: file:///etc/hosts\r\nContent-Length: 0\r\n\r\n"],
+    "is no server": [b"\xff\x00GARBAGE\r\n\r\n"],
+    "leaves": [b""],
+}
+
+
+@pytest.mark.parametrize("stranger", STRANGERS)
+def test_whoever_answers_the_end_is_near_and_a_line(
+    stranger: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(verb, "LONGER", 1.0)
+    monkeypatch.setattr(verb, "MOST_ANSWER", 1 << 20)
+    gone = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            client, _ = server.accept()
+            with client, contextlib.suppress(OSError):
+                client.recv(4096)
+                for piece in STRANGERS[stranger]:
+                    client.sendall(piece)
+                    if len(piece) == 1:
+                        gone.wait(0.01)
+                if stranger != "leaves":
+                    gone.wait(180)
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        status, out, err = run(capsys, f"http://127.0.0.1:{server.getsockname()[1]}")
+        gone.set()
+        thread.join()
+    assert (status, out) == (1, "")
+    assert err.startswith("detent: http://127.0.0.1:")
+    assert err.count("\n") == 1

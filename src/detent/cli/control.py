@@ -12,7 +12,8 @@ if TYPE_CHECKING:
 
     from detent.realtime.verbs import Verb
 
-LONGER = 30.0  # seconds for an answer, beyond what a verb waits for
+LONGER = 30.0  # seconds for an answer, all of it, beyond what a verb waits for
+MOST_ANSWER = 64 << 20  # bytes: more than the journal of any cell
 
 
 def control(
@@ -39,7 +40,7 @@ def control(
     json
         Print the answer as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly
+    from detent.cli.endings import asked_wrongly, failed
     from detent.realtime import verbs
     from detent.realtime.verbs import AskedWrongly
 
@@ -54,12 +55,16 @@ def control(
     except AskedWrongly as error:
         asked_wrongly(error)
     timeout = read.get("timeout")
-    patience = LONGER + (timeout / 1e9 if isinstance(timeout, int) else 60.0)
+    waits = verbs.SHORT_WAIT if verb.waits else 0.0
+    patience = LONGER + (timeout / 1e9 if isinstance(timeout, int) else waits)
     answer = _ask(url, verb, arguments, token or os.environ.get("DETENT_TOKEN"), patience)
     if json:
         print(json_text.dumps(answer))
     else:
-        _print(verb.name, answer)
+        try:
+            _print(verb.name, answer)
+        except (LookupError, TypeError, ValueError, AttributeError):
+            failed(f"{url} is no service: it does not answer {verb.name} as one does")
     if answer.get("reached") is False:
         raise SystemExit(1)
 
@@ -99,7 +104,10 @@ LAST_LATIN = 0xFF  # what comes behind that no header of a request can have
 
 
 def _ask(url: str, verb: "Verb", given: Mapping[str, str], token: str | None, patience: float) -> dict[str, Any]:
-    """The answer. Ends the program with a line on stderr if there is none."""
+    """The answer. Ends the program with a line on stderr if not all of it has come within so many seconds."""
+    import socket
+    import threading
+    from contextlib import suppress
     from http.client import HTTPConnection, HTTPException
     from urllib.parse import urlsplit
 
@@ -119,14 +127,30 @@ def _ask(url: str, verb: "Verb", given: Mapping[str, str], token: str | None, pa
             asked_wrongly(AskedWrongly("the token has characters that no request can have", "give the one of serve"))
         headers["Authorization"] = f"Bearer {token}"
     connection = HTTPConnection(host, port, timeout=patience)
+    late = threading.Event()
+
+    def end_it() -> None:
+        late.set()
+        with suppress(OSError, AttributeError):  # it is closed, or was never opened
+            connection.sock.shutdown(socket.SHUT_RDWR)
+
+    timer = threading.Timer(patience, end_it)  # who answers a byte at a time is patient with no single one
+    timer.daemon = True
+    timer.start()
     try:
         connection.request("POST", f"/{verb.name}", json_text.dumps(given), headers)
         response = connection.getresponse()
-        status, answer = response.status, json_text.loads(response.read())
-    except (OSError, HTTPException, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
+        data = response.read(MOST_ANSWER + 1)
+        if len(data) > MOST_ANSWER:
+            failed(f"{url} is no service: its answer has no end")
+        status, answer = response.status, json_text.loads(data)
+    except (OSError, HTTPException, ValueError, RecursionError) as error:
+        if late.is_set() or isinstance(error, TimeoutError):
+            failed(f"{url} does not answer within {patience:g} s: is it a service? detent serve prints its URL")
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split())
         failed(f"{url} does not answer: {reason}; start it with detent serve TARGET --control {host}:{port}")
     finally:
+        timer.cancel()
         connection.close()
     if status != 200 or not isinstance(answer, dict):
         told = (
