@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 from detent.axis import Axis, MotionCut, MotionEnded, MotionStarted
 from detent.pulses import Train
-from detent.realtime.boards.events import Event, Ready
+from detent.realtime.boards.events import Event, Ready, Stopped
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
@@ -43,6 +43,7 @@ class Bench:
         self.events: list[Event] = []
         self.axes: dict[str, Axis] = {}
         self.told: dict[str, list[MotionStarted | MotionCut | MotionEnded]] = {}
+        self.did: dict[str, list[MotionStarted | MotionCut | MotionEnded]] = {}
         self.now: Ns = 0
         self.stride: Ns = 2 * MS
         self.aligned = False
@@ -73,12 +74,25 @@ class Bench:
         """Everything at `wall`: what came, the cell, what leaves."""
         self.wall = max(self.wall, wall)
         self.boards.due(self.wall)
-        self.events += self.boards.events()
+        self.hear()
         if self.aligned:
             self.now = max(self.now, self.boards.cell_at(self.wall))
             self.live()
             self.boards.commit(self.now, self.wall)
-        self.events += self.boards.events()
+        self.hear()
+
+    def hear(self) -> None:
+        """What came; what was late is told once more, as the owner of a stepper has to."""
+        events = self.boards.events()
+        self.events += events
+        for event in events:
+            if isinstance(event, Stopped) and event.dry:
+                stepper = self.boards.steppers[event.stepper]
+                stepper.rewind(event.shaft, slipped=True)
+                did = self.did.get(event.stepper, [])
+                begun = [n for n, e in enumerate(did) if isinstance(e, MotionStarted) and e.at <= max(event.dry)]
+                for entry in did[begun[-1] :]:
+                    stepper.tell(entry)
 
     def live(self) -> None:
         """The axes run to now, and what they did is told."""
@@ -88,6 +102,7 @@ class Bench:
             told = self.told[name]
             for entry in told:
                 self.boards.steppers[name].tell(entry)
+            self.did.setdefault(name, []).extend(told)
             told.clear()
 
     def step(self) -> None:

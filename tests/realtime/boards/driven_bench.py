@@ -8,10 +8,12 @@ from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import Description, parse
 from detent.cell.outside import Store, no_store
+from detent.realtime.boards.dictionary import Value
 from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
+from detent.realtime.boards.frames import Reader, read_integer
 from detent.realtime.boards.link import Link
 from detent.realtime.boards.opening import boards_of, make_ready
 from detent.realtime.boards.plan import Plan, plan
@@ -24,14 +26,42 @@ from detent.ticks import MS, SECOND, US, Ns
 
 
 class Wire(FakePort):
-    """A fake board whose host may be kept away just before it writes: what it writes comes when it does."""
+    """A fake board whose host may be kept away while it writes: before it, behind it, or in the middle of a block."""
 
     def __init__(self, board: FakeBoard, clock: Callable[[], Ns], **given: Any) -> None:
         super().__init__(board, **given)
         self._clock = clock
+        self.spare_exposed = False  # nothing is held up that has a time and no step before it
+        self._until: dict[Value, int] = {}
+
+    def _exposed(self, data: bytes) -> bool:
+        """Whether a board shuts down if this comes later than it says: it cannot be kept from that."""
+        found = False
+        for each in Reader().feed(data):
+            place = 0
+            while place < len(each.payload):
+                number, place = read_integer(each.payload, place)
+                message, place = self.board.form(number).decode(each.payload, place)
+                if message.name == "trsync_set_timeout":
+                    tick, before = self.board.whole(message.number("clock")), self._until.get(message.values["oid"], 0)
+                    found = found or tick <= before
+                    self._until[message.values["oid"]] = tick
+                found = (
+                    found
+                    or message.name in ("trsync_start", "queue_digital_out")
+                    or (message.name == "endstop_home" and bool(message.values["sample_count"]))
+                )
+        return found
 
     def send(self, data: bytes, wall: Ns) -> None:
-        super().send(data, max(wall, self._clock()))
+        if self._exposed(data) and self.spare_exposed:
+            super().send(data, wall)
+            return
+        later = max(wall, self._clock())
+        gone = (later - wall) % (len(data) + 1) if later > wall else len(data)
+        super().send(data[:gone], wall)
+        if gone < len(data):
+            super().send(data[gone:], later)
 
 
 def no_file(name: str) -> str:
@@ -68,8 +98,12 @@ class Bench:
         board: Mapping[str, Any] | None = None,
         read: Callable[[str], str] = no_file,
         away: Callable[[bool], Ns] = lambda writing: 0,
+        spare_exposed: bool = False,
     ) -> None:
-        """`away`: for how long the computer is elsewhere, at each look at its clock, and (True) before each write."""
+        """`away`: for how long the computer is elsewhere, at each look at its clock, and (True) within each write.
+
+        `spare_exposed`: not within one that has to come in time.
+        """
         self.wall = 1_000 * SECOND
         self._away = away
         self._jitter, self._until = jitter, self.wall
@@ -77,15 +111,16 @@ class Bench:
         trial = build(described, read, record=False)
         self.plan = plan(described, trial.controllers())
         self.machines: dict[str, Machine] = {}
-        self.ports: dict[str, FakePort] = {}
+        self.ports: dict[str, Wire] = {}
         made = iter(self.plan.setups)
 
-        def open_port(address: str) -> FakePort:
+        def open_port(address: str) -> Wire:
             name = next(made)[0].name
             self.machines[name] = machine_of(described, self.plan, name, switches or {})
             fake = FakeBoard(self.machines[name], **{"moves": 400, **(board or {})})
             fake.kept_log = False
             self.ports[name] = Wire(fake, lambda: self.look(True), **(port or {}))
+            self.ports[name].spare_exposed = spare_exposed
             return self.ports[name]
 
         self.boards = boards_of(self.plan, open_port)

@@ -109,6 +109,9 @@ class Host:
         self.machine, self.events, self.aligned, self.now = machine, [], False, 0  # type: ignore[var-annotated]
         self.boards = Boards([(setup, open_port(TERMINAL))])
         self.told: list[object] = []
+        self.did: list[object] = []  # of the motion in force
+        self.dried = 0
+        self.armed: tuple[dict[str, bool], Ns] = {}, 0
         self.axis = Axis(self.told)  # type: ignore[arg-type]
         self.busy: Ns = 0
 
@@ -136,7 +139,7 @@ class Host:
         for descriptor in writable:
             boards.flush(descriptor, wall)
         boards.due(wall, self.machine.wall)
-        self.events += boards.events()
+        self.hear()
         if self.aligned:
             wall = self.machine.wall()
             self.now = max(self.now, boards.cell_at(wall))
@@ -144,12 +147,34 @@ class Host:
                 self.axis.advance(self.axis.deadline)
             for entry in self.told:
                 boards.steppers["slide"].tell(entry)  # type: ignore[arg-type]
+                if isinstance(entry, MotionStarted) and entry.first == 1:
+                    self.did.clear()
+                self.did.append(entry)
             self.told.clear()
             at = boards.commit_at()
             if at is not None and at <= wall:
                 boards.commit(self.now, wall, self.machine.wall)
-            self.events += boards.events()
+            self.hear()
         self.busy += time.thread_time_ns() - began
+
+    def arm(self, inputs: dict[str, bool], at: Ns) -> None:
+        self.armed = inputs, at
+        self.boards.stops["slide"].arm(inputs, at)
+
+    def hear(self) -> None:
+        """What came; the steps that were late are told once more."""
+        for event in self.boards.events():
+            if isinstance(event, Stopped) and event.dry:
+                self.dried += 1
+                stepper = self.boards.steppers["slide"]
+                stepper.rewind(event.shaft, slipped=True)
+                self.boards.stops["slide"].arm(*self.armed)
+                for entry in self.did:
+                    stepper.tell(entry)  # type: ignore[arg-type]
+            else:
+                self.events.append(event)
+                if isinstance(event, Stopped):
+                    self.armed = {}, 0
 
     def until(self, done: Callable[[], bool], most: float = 20.0) -> None:
         end = time.monotonic() + most
@@ -242,6 +267,32 @@ def test_it_says_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
         print(f"\nchecked against {look.found.firmware} on {look.found.mcu} at {look.found.frequency} Hz")
 
 
+def test_steps_that_come_too_late_find_the_axis_stopped(host: Host) -> None:
+    """What is written is held up for longer than what is under way, again and again: slips, and no shutdown."""
+    [(_, port)] = host.boards._pairs
+    begin, send = host.axis.shaft, port.send
+    held: list[bytes] = []
+
+    def hold(data: bytes, wall: Ns) -> None:
+        held.append(data)
+
+    host.move(constant_acceleration.move(200, 1000, 60, 3000).train, 1)
+    for _ in range(5):
+        host.run(0.2)
+        port.send = hold  # type: ignore[method-assign]
+        host.run((host.boards.lead + host.stepper.lag + 30 * MS) / SECOND)  # type: ignore[attr-defined]
+        port.send = send  # type: ignore[method-assign]
+        for data in held:
+            send(data, host.machine.wall())
+        held.clear()
+    host.rest()
+    assert not host.of(CountDiffers)
+    assert host.stepper.counted() == begin + 3000  # type: ignore[attr-defined]
+    assert host.dried >= 4
+    if MACHINE:
+        assert host.machine.position == begin + 3000
+
+
 def test_moves_are_counted_as_they_are_told(host: Host) -> None:
     begin = host.axis.shaft
     for direction, steps in ((1, 1000), (-1, 400), (1, 3), (-1, 1)):
@@ -287,7 +338,7 @@ def test_homings_stop_on_the_step(host: Host) -> None:
         edge = machine.position + 40 + 7 * n
         machine.switch(EOT, edge, 1 << 40)
         host.run(0.01)
-        host.boards.stops["slide"].arm({"EOT": False}, host.now)
+        host.arm({"EOT": False}, host.now)
         host.move(constant_acceleration.move(rate, rate, 1, None).train, 1)
         [started] = host.told
         assert isinstance(started, MotionStarted)

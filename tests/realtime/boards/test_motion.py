@@ -257,6 +257,7 @@ def test_a_lag_that_a_rest_has_caught_up_counts_until_its_pulses_have_left() -> 
     made.move(constant_acceleration.move(1000, 1000, 1, 200).train, 1)
     made.run(100 * MS)
     made.turn(made.wall + 80 * MS)
+    made.run(5 * MS)  # the board says where it ran dry
     stepper = made.boards.steppers["slide"]
     lag = stepper.lag
     assert lag > 20 * MS

@@ -41,6 +41,7 @@ def test_what_was_not_given_to_the_board_is_taken_back_without_a_trace() -> None
     made = bench()
     out = made.boards.outs["MOV"]
     at = made.now
+    made.boards.stops["slide"].arm({"EOT": False}, at)
     out.set(True, at + 1)
     made.run(5 * MS)  # of a lead of 30: it is still here
     out.rewind(at)
@@ -59,6 +60,35 @@ def test_what_has_left_is_corrected() -> None:
     made.run(100 * MS)
     assert [level for _, level in changes(made)] == [True, False]
     assert out.corrections == 1
+
+
+def test_what_nothing_can_take_back_is_given_at_once() -> None:
+    """So that a host which is kept away for less than the lead is not late with it: also what a stop begins with."""
+    made = bench()
+    out = made.boards.outs["MOV"]
+    out.set(True, made.now)
+    made.boards.stops["slide"].arm({"EOT": False}, made.now)
+    made.run(3 * MS)
+    assert out.level is True
+    assert changes(made) == []
+    out.set(False, made.now)
+    made.run(3 * MS)
+    assert out.level is True, "it waits: a stop may take it back"
+    made.run(100 * MS)
+    assert [level for _, level in changes(made)] == [True, False]
+
+
+def test_a_watchdog_is_fed_without_a_time() -> None:
+    """So that a host which is kept away before it writes is not late with it."""
+    made = bench()
+    made.boards.outs["ENABLE"].set(True, made.now)
+    made.run(100 * MS)
+    before = len(made.board.log)
+    made.run(3 * SECOND)
+    fed = [name for _, name, _ in made.board.log[before:] if name.endswith("digital_out")]
+    assert len(fed) >= 5
+    assert set(fed) == {"update_digital_out"}
+    assert made.machine.outputs["gpio4"] is False
 
 
 def test_what_has_left_and_is_set_again_alike_stays() -> None:

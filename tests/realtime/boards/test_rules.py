@@ -75,7 +75,7 @@ class Raw:
                 select.select(self.port.reading(), (), (), 0.001)
             else:
                 self._wall += MS // 10
-            for payload in self.link.receive(self.port.receive(self.wall()), self.wall()):
+            for payload, _ in self.link.receive(self.port.receive(self.wall()), self.wall()):
                 self.heard += self.words.parse(payload)
             self.link.due(self.wall())
             self.port.send(self.link.take(), self.wall())

@@ -100,8 +100,16 @@ def session(kind: str, seed: int) -> int:
     random, what = Random(seed), KINDS[kind]
     closed = switches(kind, random)
     text = what.text + BOARD.format(lead=random.choice([5, 10, 30, 60]))
-    with Bench(text, switches=closed, jitter=lambda: random.randrange(400 * US)) as bench:
+    chance, on = random.choice([0.0, 0.001, 0.003]), [False]
+
+    def away(_: bool) -> Ns:
+        return random.randrange(90 * MS) if on[0] and random.random() < chance else 0
+
+    with Bench(
+        text, switches=closed, jitter=lambda: random.randrange(400 * US), away=away, spare_exposed=True
+    ) as bench:
         bench.run(400 * MS)
+        on[0] = True
         for _ in range(random.randrange(4, 14)):
             line = random.choice(what.lines).format(
                 n=random.randrange(1, 800), s=random.choice([5, 10, 20, 50]), t=random.randrange(50, 300),
@@ -116,6 +124,7 @@ def session(kind: str, seed: int) -> int:
                 bench.stall(random.randrange(5 * MS, 120 * MS))
             if random.random() < 0.25:
                 bench.press(random.choice(what.presses), random.randrange(2))
+        on[0] = False
         for name in what.presses:
             bench.press(name, 1)
         bench.run(50 * MS)

@@ -6,7 +6,7 @@ import pytest
 from tests.realtime.boards.driven_bench import Bench
 
 from detent.realtime.boards.states import Standing, Weight
-from detent.ticks import MS, US
+from detent.ticks import MS, US, Ns
 
 CELL = """
 [units.x]
@@ -31,10 +31,18 @@ def run(seed: int) -> int:
         "x.LIMIT-A": ("x", edge, 10**6), "x.LIMIT-B": ("x", -(10**6), -edge), "x.HOME": ("x", -20, -10),
     }  # fmt: skip
     text = CELL.format(lead=random.choice([5, 10, 30, 60]))
-    with Bench(text, switches=switches, jitter=lambda: random.randrange(400 * US)) as bench:
+    chance, on = random.choice([0.0, 0.001, 0.003]), [False]
+
+    def away(_: bool) -> Ns:
+        return random.randrange(90 * MS) if on[0] and random.random() < chance else 0
+
+    with Bench(
+        text, switches=switches, jitter=lambda: random.randrange(400 * US), away=away, spare_exposed=True
+    ) as bench:
         bench.run(100 * MS)
         bench.type("x", " ")
         bench.run(200 * MS)
+        on[0] = True
         for _ in range(random.randrange(3, 15)):
             line = random.choice(LINES).format(n=random.randrange(1, 2 * edge), r=random.randrange(200, 4000))
             if len(line) == 1:
@@ -46,6 +54,7 @@ def run(seed: int) -> int:
                 bench.stall(random.randrange(5 * MS, 120 * MS))
             if random.random() < 0.2:
                 bench.press(random.choice(["x.JOG1", "x.JOG2"]), random.randrange(2))
+        on[0] = False
         bench.press("x.JOG1", 1)
         bench.press("x.JOG2", 1)
         bench.run(50 * MS)

@@ -45,6 +45,13 @@ class AxisLedger:
         told = self.motions.before(count)
         return told[-1] if told and isinstance(told[-1], MotionStarted) else None
 
+    def motions_from(self, at: Ns) -> list[Motion]:
+        """The motion in force at `at`, if there is one, and everything behind it."""
+        told = self.motions.before(self.motions.count)
+        before = [motion for motion in told if motion.at <= at]
+        force = before[-1:] if before and isinstance(before[-1], MotionStarted) else []
+        return [*force, *told[len(before) :]]
+
     def take(self, entry: Motion) -> None:
         """The axis did this."""
         motion = self.motion

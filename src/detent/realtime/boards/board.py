@@ -144,9 +144,10 @@ class Board:
             return
         core = self.core
         was = core.link.synced
-        for payload in core.link.receive(data, wall):
+        for said in core.link.receive(data, wall):
+            core.known = said.known
             try:
-                messages = core.dictionary.parse(payload)
+                messages = core.dictionary.parse(said.payload)
             except FrameError:
                 continue  # a word of an earlier life
             for message in messages:
@@ -196,8 +197,8 @@ class Board:
                 self._give(self._equipment.feed, wall, clock)
         core.link.flush(wall)
 
-    def commit(self, now: Ns, wall: WallNs, clock: Callable[[], WallNs] | None = None) -> None:
-        """The cell is at `now`: send what is certain.
+    def commit(self, now: Ns, wall: WallNs, clock: Callable[[], WallNs] | None = None, firm: Ns | None = None) -> None:
+        """The cell is at `now`: send what is certain. Nothing is taken back up to `firm` (None: as stops here say).
 
         With a `clock` (the wall's) it is looked at again when everything is ready to be written: what has gone stale
         meanwhile, because the computer was elsewhere, is taken back and made anew. Write at once what `take` gives.
@@ -205,7 +206,8 @@ class Board:
         if self.state is not State.READY:
             return
         self._equipment.talk(wall)
-        self._give(partial(self._equipment.commit, now), wall, clock)
+        firm = self.firm if firm is None else firm
+        self._give(partial(self._equipment.commit, now, firm), wall, clock)
 
     def _give(self, work: Callable[[WallNs, int], bool], wall: WallNs, clock: Callable[[], WallNs] | None) -> None:
         """Do `work`, which says things that have a time, until it was quick enough; it tells whether it waits.
@@ -233,13 +235,19 @@ class Board:
     @property
     def starving(self) -> bool:
         """Whether steps have waited for room on the wire, and there is room again."""
-        return self.state is State.READY and self._equipment.starved and self.core.link.spare >= ROOM
+        wanted = ROOM + self._equipment.renewing
+        return self.state is State.READY and self._equipment.starved and self.core.link.spare >= wanted
 
     def heard(self) -> WallNs | None:
         """Whatever its stops did up to this wall time was told; None: none of them can do anything."""
         if self.state is not State.READY:
             return None
         return self._equipment.heard()
+
+    @property
+    def firm(self) -> Ns:
+        """Nothing up to this cell time is taken back by what an input does."""
+        return self._equipment.firm
 
     def inquire(self, wall: WallNs) -> None:
         """Have something acknowledged, so that `heard` comes on; what is under way already will be."""

@@ -180,8 +180,10 @@ class Check:
         guards = {name: not level for name, level in self.guards(axis).items() if name not in expected}
         boards.stops[axis.stepper].arm(guards, now)
         train = Train((Uniform.at_rate(0, rate, steps),), to_fixed(now))
-        stepper.tell(MotionStarted(now, train, 1, direction, began, axis.axis))
-        stepper.tell(MotionEnded(train.time_of(steps), steps, axis.axis))
+        ended = MotionEnded(train.time_of(steps), steps, axis.axis)
+        motion = MotionStarted(now, train, 1, direction, began, axis.axis), ended
+        for entry in motion:
+            stepper.tell(entry)
         end = wall() + (steps * SECOND) // rate + self.plan.lead + PATIENCE
         met: list[Met] = []
         why = ""
@@ -193,7 +195,12 @@ class Check:
                 gone = train.steps_by(boards.cell_at(wall()) - self.plan.lead)
                 met.append(Met(event.input, int(event.level), gone))
             for heard in self._heard:
-                if isinstance(heard, Stopped) and heard.stepper == axis.stepper:
+                if isinstance(heard, Stopped) and heard.stepper == axis.stepper and heard.dry:
+                    stepper.rewind(heard.shaft, slipped=True)  # they were late, and come later
+                    boards.stops[axis.stepper].arm(guards, now)
+                    for entry in motion:
+                        stepper.tell(entry)
+                elif isinstance(heard, Stopped) and heard.stepper == axis.stepper:
                     made = abs(heard.shaft - began)
                     met = [one for one in met if one.input != heard.input]  # this is where it was, exactly
                     met.append(Met(heard.input, int(heard.level), made))

@@ -81,6 +81,7 @@ class Core:
         self.events: list[Event] = []
         self.scale = Scale(1)  # cell time to ticks at the pins: the lead is in it
         self.slips = 0
+        self.known = 0  # so many messages of ours had come when the board said what is looked at now
         self.earliest: int | None = None  # of the ticks for which something was said since this was None
         self._questions: dict[tuple[str, int], _Question] = {}
 

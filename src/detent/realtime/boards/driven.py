@@ -131,6 +131,7 @@ class Driven(Failures):
         """At rest a stepper has been told of all pulses that the cell gave, and of no others: whatever befell it."""
         for ledger in self.ledgers:
             resting = ledger.motion is None and ledger.stepper.resting and ledger.awaits is None
+            resting = resting and not self.boards.stops[ledger.name].firing
             if ledger.standing is Standing.DRIVEN and resting:
                 sent, here = ledger.stepper.shaft, ledger.shaft_at(self.cell.now)
                 if sent != here and not self._pending:

@@ -9,16 +9,17 @@ from detent.realtime.boards.core import Core
 from detent.realtime.boards.dictionary import Value
 from detent.realtime.boards.drivers import Driver, Wire
 from detent.realtime.boards.inputs import Inputs
-from detent.realtime.boards.lag import settle
+from detent.realtime.boards.lag import Lag, settle
 from detent.realtime.boards.outs import DigitalOut
 from detent.realtime.boards.setup import DriverSetup, InputSetup, SetupProblem
 from detent.realtime.boards.stepper import Stepper
 from detent.realtime.boards.stops import Stop
 from detent.realtime.boards.undo import Undo, kept, together
 from detent.realtime.pace import WallNs
-from detent.ticks import Ns
+from detent.ticks import NEVER, Ns
 
 ONE_RUN = 40  # bytes of messages at most, with a direction and a clock
+ONE_TIMEOUT = 9
 
 
 class Equipment:
@@ -127,22 +128,43 @@ class Equipment:
         for driver in self.drivers.values():
             driver.shut_down()
 
-    def commit(self, now: Ns, wall: WallNs, most: int) -> bool:
-        """The cell is at `now`: send what is certain, `most` runs of steps.
+    def commit(self, now: Ns, firm: Ns, wall: WallNs, most: int) -> bool:
+        """The cell is at `now`: send what is certain, `most` runs of steps; nothing is taken back up to `firm`.
 
         Whether an output waits until stops were heard of.
         """
         waits, heard = False, self.heard()
         for out in self.outs.values():
             if out.wants(wall):
-                waits |= out.commit(wall, heard)
+                waits |= out.commit(wall, heard, firm)
+        for stop in self.stops.values():
+            if stop.dry(wall) and not self.steppers[stop.stepper].resting:
+                stop.ask_dry(wall)
         for name, stop in self.stops.items():
             if stop.pending:
                 settle([axis for axis in self.steppers.values() if axis.of is self.steppers[name].of], now, wall)
                 stop.commit(wall)
         settle(self.steppers.values(), now, wall)
+        for name, due in self._dues().items():
+            self.stops[name].before_steps(due, wall)
         self._send(tuple(self.steppers.values()), now, wall, most)
+        for name, due in self._dues().items():
+            self.stops[name].behind_steps(due, wall)
         return waits
+
+    @property
+    def renewing(self) -> int:
+        """Bytes that follow steps: what says that the next ones may come."""
+        return ONE_TIMEOUT * len(self.steppers)
+
+    def _dues(self) -> dict[str, int | None]:
+        """The tick before which no stepper of its unit has a step to come: what is late stops all of them at once."""
+        found: dict[Lag, int] = {}
+        for axis in self.steppers.values():
+            due = axis.due()
+            if due is not None:
+                found[axis.of] = min(due, found.get(axis.of, due))
+        return {name: None if axis.resting else found.get(axis.of) for name, axis in self.steppers.items()}
 
     def _send(self, axes: Sequence[Stepper], now: Ns, wall: WallNs, most: int) -> None:
         """Their pulses in `most` runs, those first that are due first, and none that would wait for an acknowledgement.
@@ -156,7 +178,7 @@ class Equipment:
             if due is not None:
                 turns.append((due, number, runs))
         heapify(turns)
-        while turns and most and self._core.link.spare >= ONE_RUN:
+        while turns and most and self._core.link.spare >= ONE_RUN + self.renewing:
             most -= 1
             _, number, runs = turns[0]
             due = next(runs, None)
@@ -175,9 +197,8 @@ class Equipment:
         """As it is now, again: what `commit` and `feed` change at `wall`."""
         changing: list[Undo] = [self._core.kept()]
         for name, stop in self.stops.items():
-            if stop.pending:
+            if stop.pending or stop.alive or not self.steppers[name].resting:
                 changing.append(kept(stop))
-            if stop.pending or not self.steppers[name].resting:
                 changing.append(self.steppers[name].kept())
         changing += [kept(out) for out in self.outs.values() if out.wants(wall)]
         return together(changing)
@@ -187,6 +208,7 @@ class Equipment:
         return [
             *(out.deadline() for out in self.outs.values()),
             *(axis.proof_due() for axis in self.steppers.values()),
+            *(stop.deadline() for stop in self.stops.values()),
             *(driver.deadline() for driver in self.drivers.values()),
         ]
 
@@ -209,12 +231,22 @@ class Equipment:
             at = axis.proof_due()
             if at is not None and wall >= at:
                 axis.prove(wall)
+        dues = self._dues()
+        for name, stop in self.stops.items():
+            at = stop.deadline()
+            if at is not None and wall >= at:
+                stop.behind_steps(dues[name], wall)
         for driver in self.drivers.values():
             driver.due(wall)
 
     def heard(self) -> WallNs | None:
         """Whatever its stops did up to this wall time was told; None: none of them can do anything."""
         return min((at for stop in self.stops.values() if (at := stop.heard()) is not None), default=None)
+
+    @property
+    def firm(self) -> Ns:
+        """Nothing up to this cell time is taken back by what an input does."""
+        return min((stop.firm for stop in self.stops.values()), default=NEVER)
 
     def trigger(self, oid: int) -> Stop | None:
         """The stop whose trigger is that object."""

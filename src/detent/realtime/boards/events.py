@@ -37,6 +37,7 @@ class Stopped(NamedTuple):
     `edge` is that of the first sample which showed the level. `shaft` is the firmware's count as a shaft position.
     `present` is the level of the input when it was asked for afterwards: a glitch may be over. `levels` are those of
     every input that may stop this stepper, asked for together: while it stands, what follows it stands as well.
+    `dry`: no input has stopped it, but its next pulses did not come in time; it happened about one of these cell times.
     """
 
     board: str
@@ -48,6 +49,7 @@ class Stopped(NamedTuple):
     shaft: int
     present: bool
     levels: Mapping[str, bool] = MappingProxyType({})
+    dry: tuple[Ns, ...] = ()
 
 
 class Slipped(NamedTuple):

@@ -36,6 +36,8 @@ class Failures(Rollback):
                 ledger = self._by_stepper[event.stepper]
                 if ledger.standing is Standing.DRIVEN and ledger.awaits is not None:
                     self._stopped_too(ledger, event)
+                elif ledger.standing is Standing.DRIVEN and event.dry:
+                    self._ran_dry(event)
                 elif ledger.standing is Standing.DRIVEN and event.input in self.plan.inputs:
                     self._stopped(event)
                 elif ledger.standing is Standing.DRIVEN:

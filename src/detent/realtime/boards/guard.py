@@ -25,11 +25,16 @@ class Guard:
         self.wanted: dict[str, Level] = {}
         self._tails: dict[str, _Tail] = {}
         self.armed: dict[str, Level] = {}
+        self._over: Ns = -1  # until when something was armed, before
 
     @property
     def next(self) -> Ns:
         """The cell time up to which pulses must have left the pins before an input is let go."""
         return min((tail.at for tail in self._tails.values()), default=NEVER)
+
+    def watched(self, at: Ns) -> bool:
+        """Whether some input watched the axis at cell time `at`, or later."""
+        return bool(self.armed) or self._over >= at
 
     def want(self, inputs: Mapping[str, Level], at: Ns, now: Ns) -> None:
         """From cell time `at` on these inputs cut the motion; what did before watches the pulses given up to `now`."""
@@ -52,6 +57,7 @@ class Guard:
             if wished:
                 self._stop.arm({name: bool(level) for name, level in wished.items()}, at)
             else:
+                self._over = at
                 self._stop.disarm()
 
     def fired(self) -> None:

@@ -21,10 +21,18 @@ MOST_PATIENCE: WallNs = 1000 * MS
 NAK_QUIET: WallNs = 3 * MS  # requests that follow each other so closely are about the same loss
 
 
+class Said(NamedTuple):
+    """What a board said, when it knew the first `known` messages of ours."""
+
+    payload: bytes
+    known: int
+
+
 class _Sent(NamedTuple):
     sequence: int  # not wrapped
     data: bytes
     at: WallNs  # first sent
+    messages: int  # in it
 
 
 class Link:
@@ -48,6 +56,8 @@ class Link:
         self._under_way: deque[_Sent] = deque()
         self._bytes_under_way = 0
         self._out = bytearray()
+        self.said = 0  # messages so far, whether they have left or not
+        self.acknowledged = 0  # of these
         self._again_at: WallNs | None = None
         self._patience = FIRST_PATIENCE
         self._repeated_at: WallNs | None = None
@@ -88,9 +98,11 @@ class Link:
     def send(self, message: bytes) -> None:
         """Queue a message; `flush` makes blocks of what waits."""
         self._waiting.append(message)
+        self.said += 1
 
     def drop_waiting(self) -> None:
         """Forget what has not been given a number yet: something more urgent comes."""
+        self.said -= len(self._waiting)
         self._waiting.clear()
 
     def flush(self, wall: WallNs) -> None:
@@ -112,7 +124,7 @@ class Link:
                 break
             for _ in range(count):
                 self._waiting.popleft()
-            self._under_way.append(_Sent(self._next, data, wall))
+            self._under_way.append(_Sent(self._next, data, wall, count))
             self._bytes_under_way += len(data)
             self._next += 1
             self._out += data
@@ -123,11 +135,11 @@ class Link:
     def kept(self) -> Undo:
         """As it is now, again, as far as nothing was taken: what is sent and flushed from now on was not."""
         waiting, under_way, out = self._waiting.copy(), self._under_way.copy(), bytes(self._out)
-        numbers = self._next, self._bytes_under_way, self._again_at, self.blocks
+        numbers = self._next, self._bytes_under_way, self._again_at, self.blocks, self.said
 
         def undo() -> None:
             self._waiting, self._under_way, self._out = waiting, under_way, bytearray(out)
-            self._next, self._bytes_under_way, self._again_at, self.blocks = numbers
+            self._next, self._bytes_under_way, self._again_at, self.blocks, self.said = numbers
 
         return undo
 
@@ -138,9 +150,9 @@ class Link:
         self.bytes_sent += len(data)
         return data
 
-    def receive(self, data: bytes, wall: WallNs) -> list[bytes]:
+    def receive(self, data: bytes, wall: WallNs) -> list[Said]:
         """What came: the payloads of the board's blocks, in order. Those before it is `synced` are not for us."""
-        payloads = []
+        said = []
         for found in self._reader.feed(data):
             if not self.synced:
                 if not found.payload:
@@ -148,9 +160,9 @@ class Link:
                 continue
             self._acknowledged(found, wall)
             if found.payload:
-                payloads.append(found.payload)
+                said.append(Said(found.payload, self.acknowledged))
         self.flush(wall)
-        return payloads
+        return said
 
     def deadline(self) -> WallNs | None:
         """When `due` wants to be called."""
@@ -198,6 +210,7 @@ class Link:
         for _ in range(behind):
             taken = self._under_way.popleft()
             self._bytes_under_way -= len(taken.data)
+            self.acknowledged += taken.messages
             self.heard = taken.at
         self._repeated_at = None
         self._patience = FIRST_PATIENCE
@@ -209,7 +222,7 @@ class Link:
         self._under_way.clear()
         self._next = self._acked = sequence
         for sent in old:
-            self._under_way.append(_Sent(self._next, block(self._next, sent.data[2:-3]), sent.at))
+            self._under_way.append(_Sent(self._next, block(self._next, sent.data[2:-3]), sent.at, sent.messages))
             self._next += 1
         self._repeat(wall)
 

@@ -104,6 +104,7 @@ class Outgoing:
         self.escaped = 0  # characters that hosts heard though they were taken back
         self.rewinds = 0
         self.longest_rewind: WallNs = 0
+        self.living_again = False
 
     def begin(self, pace: Pace, inputs: Mapping[str, Level]) -> None:
         """The cell's present is the boards' present; `inputs` are what the cell was built with."""
@@ -182,7 +183,7 @@ class Outgoing:
 
     def _may_stop(self) -> bool:
         """Whether a stop may yet take back what the cell does now."""
-        return self._guarded or self.boards.heard() is not None
+        return self.living_again or self._guarded or self.boards.heard() is not None
 
     def _inquire(self) -> None:
         """Hear of what the boards did lately, where words or images wait for nothing else."""

@@ -81,8 +81,10 @@ class DigitalOut:
 
     # -- what leaves
 
-    def commit(self, wall: WallNs, heard: WallNs | None = None) -> bool:
+    def commit(self, wall: WallNs, heard: WallNs | None = None, firm: Ns = 0) -> bool:
         """Give the board what is due soon, and the watchdog its food. Whether a change waits for `heard`.
+
+        What is set for cell time `firm` or before cannot be taken back: it is given at once.
 
         That is the wall time up to which stops of the board have been heard of (None: there are none). What is late
         already waits for it, as one that took place meanwhile would take it back.
@@ -96,7 +98,7 @@ class DigitalOut:
         horizon = soonest + core.ticks(max(HOLD - core.setup.margin, core.setup.margin))
         known = None if heard is None else core.clock.tick_at(heard)
         waits = False
-        while self._pending and self._pending[0].tick <= horizon:
+        while self._pending and (self._pending[0].tick <= horizon or self._pending[0].at <= firm):
             if known is not None and known < self._pending[0].tick < soonest:
                 waits = True
                 break
@@ -106,10 +108,7 @@ class DigitalOut:
                 return False
             self._given.append(change)
         if self._hungry(wall):
-            tick = core.unhurried(wall)
-            if self._pending and self._pending[0].tick <= tick:
-                tick = soonest  # a change is due before
-            self._give(tick, self.level, soonest, wall)
+            self._feed(wall)
         return waits
 
     def wants(self, wall: WallNs) -> bool:
@@ -141,6 +140,17 @@ class DigitalOut:
         core.queue.take(self.oid, tick)
         self._last_tick, self.level, self._fed_at = tick, level, wall
         return True
+
+    def _feed(self, wall: WallNs) -> None:
+        """The level that it has, at once: that has no time, and so cannot be late. Nothing may be queued meanwhile."""
+        core = self._core
+        if self._last_tick + core.ticks(UNSURE) >= core.clock.tick_at(wall):
+            self._again_at = core.clock.wall_at(self._last_tick + 2 * core.ticks(UNSURE))
+        elif core.link.spare < ONE_CHANGE:
+            self._again_at = wall + RETRY
+        else:
+            core.command("update_digital_out", oid=self.oid, value=int(self.level is not self.setup.pin.active_low))
+            self._fed_at = wall
 
     def _hungry(self, wall: WallNs) -> bool:
         at = self.deadline()

@@ -82,6 +82,29 @@ class Rollback(Outgoing):
         self.commit()
         self.longest_rewind = max(self.longest_rewind, self._wall() - began)
 
+    def _ran_dry(self, event: Stopped) -> None:
+        """Pulses did not reach the board in time, and it has stopped before them: what it did not make comes later.
+
+        The cell lives through it once more, and does the same, so that every input is armed again where it was.
+        """
+        ledger = self._by_stepper[event.stepper]
+        found = [(ledger.instant_of(event.shaft, near), near) for near in event.dry]
+        at = min(min(found, key=lambda pair: abs(pair[0] - pair[1]))[0], self.cell.now)
+        guarded = ledger.guard.watched(at)
+        ledger.guard.fired()
+        if ledger.place_at(at) != event.shaft or (guarded and not self.past.reaches(at)):
+            self._fault(ledger, f"it was late, and stands at {event.shaft}: nobody knows when that was")
+            self._place(ledger, event.shaft)
+            return
+        if guarded:
+            self._take_back(ledger, at, (), lambda action: False, event)
+        else:
+            ledger.stepper.rewind(event.shaft, slipped=True)
+            for motion in ledger.motions_from(at):
+                ledger.stepper.tell(motion)
+        self._arm()
+        self.commit()
+
     def _heard(self, levels: Mapping[str, bool]) -> None:
         """Inputs were asked for their levels, and no report tells them again: what the cell has not, it gets now."""
         for name, found in levels.items():
@@ -142,6 +165,8 @@ class Rollback(Outgoing):
                 counts.append(moment.counts[place] + len(heard))
                 place += 1
             self._stores.cut()
+            if event.dry:  # nothing is different from there on: what was armed is armed
+                met.append((at, self._cuts(stopped)))
 
         met: list[tuple[Ns, dict[str, Level]]] = []  # what would stop it, from when on
 
@@ -152,7 +177,9 @@ class Rollback(Outgoing):
                 met.append((self.cell.now, inputs))
 
         self._stores.count = [m for m in self.past.moments if m.now <= at][-1].counts[-1]
+        self.living_again = True  # inputs are armed anew only behind it
         self.past.back(at, actions, drop, arrived, lived)
+        self.living_again = False
         lived()
         heard: list[list[Heard]] = [self.cell.lines[number].take() for number in range(len(self.lines))]
         for line, count, new in zip(self.lines, counts[len(self.ledgers) :], heard, strict=True):
@@ -204,7 +231,7 @@ class Rollback(Outgoing):
                     ledger.end_told(now, old[ledger.name])
                     self._contradicted(ledger, stopped, lost)
                 continue
-            ledger.stepper.rewind(event.shaft)
+            ledger.stepper.rewind(event.shaft, slipped=bool(event.dry))
             force = ledger.motion_after(count)
             if force is not None:
                 ledger.stepper.tell(force)

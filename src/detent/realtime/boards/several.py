@@ -176,8 +176,9 @@ class Boards:
                     stepper.rescale()
         if len(self._pairs) > 1:  # a unit on several boards is late on all of them
             settle([s for s in self.steppers.values() if self.boards[s.board].state is State.READY], now, wall)
+        firm = min(board.firm for board, _ in self._pairs)
         for board, port in self._pairs:
-            board.commit(now, wall, clock)
+            board.commit(now, wall, clock, firm)
             self._pump(board, port, wall)
             board.release_suppressed(wall)
             if clock is not None:

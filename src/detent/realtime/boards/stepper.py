@@ -84,6 +84,7 @@ class Stepper:
         self._regaining = False
         self._proved = True  # the count was compared since the last pulse
         self._doubted: tuple[int, WallNs] | None = None  # by how much the count differed, and when that is believed
+        self.said = 0  # messages up to its newest step
 
     # -- configuration
 
@@ -241,18 +242,18 @@ class Stepper:
         self.of.forget()
         self._own, self._trail = 0, (0, 0)
 
-    def rewind(self, shaft: int) -> None:
+    def rewind(self, shaft: int, *, slipped: bool = False) -> None:
         """Forget every entry told so far: the firmware has stopped, and counts `shaft`.
 
         What the cell does from the instant on to which it was taken back is told next, beginning with the
         MotionStarted in force there, if any; pulses up to that instant are not given again. Pulses too near are made
-        later (`lag` grows).
+        later (`lag` grows). `slipped`: it has stopped as these were late already.
         """
         self._spans.clear()
         self._runs = None
         self._told = self._sent = shaft
         self._halted = False
-        self._regaining = True
+        self._regaining = not slipped
         self._proved, self._doubted = False, None
 
     def next_pulse(self) -> Ns | None:
@@ -263,6 +264,13 @@ class Stepper:
         if span.last is not None and span.next > span.last:
             return None
         return span.train.time_of(span.next)
+
+    def due(self) -> int | None:
+        """The tick before which its next pulse cannot come; None: none is to come, as far as it was told."""
+        if self.next_pulse() is None:
+            return None
+        tick, error = self._ready(self._spans[0]).due(), self._core.setup.error
+        return None if tick is None else tick - (0 if error == "exact" else self._core.ticks(error))
 
     # -- what leaves
 
@@ -331,7 +339,7 @@ class Stepper:
         spans = deque(replace(span) for span in self._spans)
         channels = [(channel.last, channel.up) for channel in self._channels]
         own = (self._own, self._told, self._sent, self._sent_at, self._not_before, self._regaining, self._proved,
-               self._through)  # fmt: skip
+               self._through, self._halted, self.said)  # fmt: skip
         of = self.of
         shared = of.now, of.slips, of.slipped
 
@@ -340,7 +348,7 @@ class Stepper:
             for channel, told in zip(self._channels, channels, strict=True):
                 channel.last, channel.up = told
             (self._own, self._told, self._sent, self._sent_at, self._not_before, self._regaining, self._proved,
-             self._through) = own  # fmt: skip
+             self._through, self._halted, self.said) = own  # fmt: skip
             of.now, of.slips, of.slipped = shared
 
         return undo
@@ -393,6 +401,7 @@ class Stepper:
             core.command("queue_step", oid=channel.oid, interval=rest.interval, count=rest.steps, add=rest.add)
             core.queue.take(channel.oid, rest.tick(1))
         channel.last = run.last
+        self.said = core.link.said
 
     def set_clock(self, wall: WallNs) -> None:
         """Give the firmware a step clock where it has none: before a stop can fire, as behind that is too late."""
@@ -413,6 +422,7 @@ class Stepper:
     def halt(self) -> None:
         """The firmware has stopped it, or is gone: nothing more is sent until `rewind`."""
         self._halted = True
+        self.said = 0
         self._spans.clear()
         self._runs = None
         for channel in self._channels:

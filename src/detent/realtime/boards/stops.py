@@ -4,20 +4,27 @@ Each stepper has one trigger, with an endstop for each input that may stop it. A
 that is at its level already when the stop comes into force stops at once, so that arming has no race. The trigger stays
 alive while what is armed changes, so that no instant is unguarded, and reports regularly: a report that was lost on the
 way is followed by another.
+
+Steps that come too late would make the firmware give up. So the trigger also fires by itself, at the last tick before
+the next step is due, unless it has been put off by then, and the message that puts it off comes behind the steps.
+Whatever is late then finds the stepper stopped, and is not carried out.
 """
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from detent.realtime.boards.core import MASK, Core
+from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.dictionary import Message, Value
 from detent.realtime.boards.events import Stopped
 from detent.realtime.boards.setup import InputSetup
 from detent.realtime.boards.stepper import Stepper
 from detent.realtime.pace import WallNs
-from detent.ticks import MS, Ns
+from detent.ticks import MS, NEVER, Ns
 
-BY_THE_HOST = 255  # a reason that no input has
+BY_THE_HOST = 255  # reasons that no input has
+DRY = 254
+FAR: Ns = 1000 * MS  # ahead at most of the tick at which it fires by itself
 REPORT: Ns = 25 * MS  # of a trigger that is alive
 
 
@@ -51,10 +58,14 @@ class Stop:
         self._armed.clear()
         self._changes.clear()
         self._alive = False  # the trigger can fire
-        self._deaf = 0  # not 0: reports may still be of the trigger before
-        self._blind: WallNs | None = None  # since when reports were not listened to, and none has come since
-        self._ignored = False  # a report came meanwhile
-        self._quieting = 0  # 1: what is armed is nothing, its last word is awaited; 2: one more report
+        self._begun = 0  # messages that were said then: reports of a board that did not know them are of one before
+        self._disarmed = 0  # the same, of the last input that was disarmed
+        self._since: Ns | None = None  # cell time from which on an input may have stopped it
+        self._until: int | None = None  # the tick at which it fires by itself
+        # what that was, with the messages that were said then: it fires at one of these
+        self._before: deque[tuple[int, int]] = deque()
+        self._again = False  # that is to be put off before anything else happens
+        self._asked = False  # it was told to say where it stands, as steps come too late
         self._firing: Stopped | None = None
 
     def config(self) -> list[tuple[str, dict[str, Value | str]]]:
@@ -76,18 +87,25 @@ class Stop:
         return bool(self._changes)
 
     @property
+    def alive(self) -> bool:
+        """Whether the firmware may stop the stepper."""
+        return self._alive
+
+    @property
     def firing(self) -> bool:
-        """Whether it has fired, and its event is not made yet."""
-        return self._firing is not None
+        """Whether it has fired, or is said to, and its event is not made yet."""
+        return self._firing is not None or self._asked
+
+    @property
+    def firm(self) -> Ns:
+        """Nothing up to this cell time is taken back by what an input does."""
+        return min(self._since if self._since is not None else NEVER, *(at for _, at in self._changes), NEVER)
 
     def heard(self) -> WallNs | None:
         """Whatever it did up to this wall time was told; None: it can do nothing, and all of it was."""
         if not self._alive:
             return None
-        if self._firing is not None:
-            return 0  # when that was is not known yet
-        heard = self._core.link.heard
-        return heard if self._blind is None else min(heard, self._blind)
+        return 0 if self.firing else self._core.link.heard  # when that was is not known yet
 
     def arm(self, inputs: Mapping[str, bool], at: Ns) -> None:
         """From cell time `at` on, `inputs` stop the stepper when they take their level; replaces what was armed.
@@ -129,23 +147,27 @@ class Stop:
         added = {name: level for name, level in inputs.items() if self._armed.get(name) is not level}
         self._armed = dict(inputs)
         if not inputs:
-            self._quieting = 1 if self._alive else 0
-            if self._alive:
-                self._last_word(wall)
+            self._disarmed = core.link.said
             return
-        self._quieting = 0
-        if not self._alive:
-            self._axis.set_clock(wall)
-            report = core.unhurried(wall)
-            core.comes(report)
-            core.command("trsync_start", oid=self.oid, report_clock=report & MASK, report_ticks=core.ticks(REPORT),
-                         expire_reason=0)  # fmt: skip
-            for oid in self._axis.oids:
-                core.command("stepper_stop_on_trigger", oid=oid, trsync_oid=self.oid)
-            self._alive = True
-            self._listen_anew(wall)
+        self._begin(wall)
+        self._since = at if self._since is None else min(self._since, at)
         for name, level in added.items():
             self._on(self._inputs[name], level, at, wall)
+
+    def _begin(self, wall: WallNs) -> None:
+        """From here on the trigger can fire."""
+        if self._alive:
+            return
+        core = self._core
+        self._axis.set_clock(wall)
+        report = core.unhurried(wall)
+        core.comes(report)
+        core.command("trsync_start", oid=self.oid, report_clock=report & MASK, report_ticks=core.ticks(REPORT),
+                     expire_reason=DRY)  # fmt: skip
+        for oid in self._axis.oids:
+            core.command("stepper_stop_on_trigger", oid=oid, trsync_oid=self.oid)
+        self._alive, self._until, self._begun = True, None, core.link.said
+        self._before.clear()
 
     def _on(self, watched: _Watched, level: bool, at: Ns, wall: WallNs) -> None:
         core, setup = self._core, watched.setup
@@ -165,72 +187,115 @@ class Stop:
         if clock > wanted:
             self._axis.not_before(clock + verdict)
 
-    def _listen_anew(self, wall: WallNs) -> None:
-        """A report of the trigger before may still be on its way: behind the answer to this they are of this one."""
-        self._deaf += 1
-        self._blind, self._ignored = wall, False
-        number = self._deaf
-
-        def came(_: Message, __: WallNs) -> None:
-            if number == self._deaf:
-                self._listen()
-
-        oid = next(iter(self._inputs.values())).oid
-        self._core.ask("endstop_query_state", "endstop_state", came, wall, oid=oid)
-
-    def _listen(self) -> None:
-        self._deaf = 0
-        if not self._ignored:
-            self._blind = None
-
     def _off(self, watched: _Watched) -> None:
         self._core.command(
             "endstop_home", oid=watched.oid, clock=0, sample_ticks=0, sample_count=0, rest_ticks=0, pin_value=0,
             trsync_oid=self.oid, trigger_reason=0,
         )  # fmt: skip
 
-    def _last_word(self, wall: WallNs) -> None:
-        """Behind the answer to this nothing can fire any more; what fired before is in the next report."""
-        oid = next(iter(self._inputs.values())).oid
+    # -- steps that come too late
 
-        def came(_: Message, __: WallNs) -> None:
-            self._listen()  # this question has taken the place of that one
-            if self._quieting == 1:
-                self._quieting = 2
+    def dry(self, wall: WallNs) -> bool:
+        """Whether it has fired by now, as the next steps have not come, or will before they can."""
+        core = self._core
+        late = core.clock.tick_at(wall) + core.ticks(core.setup.margin // 2)
+        return self._alive and not self.firing and self._until is not None and self._until <= late
 
-        self._core.ask("endstop_query_state", "endstop_state", came, wall, oid=oid)
+    def ask_dry(self, wall: WallNs) -> None:
+        """It is `dry`: have it say where the stepper stands. It gets no steps before its event was dealt with."""
+        self._asked = True
+        self._axis.halt()
+        self._core.ask("trsync_trigger", "trsync_state", self._answered, wall, oid=self.oid, reason=DRY)
+
+    def _answered(self, message: Message, wall: WallNs) -> None:
+        if not self._asked:
+            return
+        if message.number("can_trigger") or self._core.known < self._begun:  # it was on its way
+            self._core.ask("trsync_trigger", "trsync_state", self._answered, wall, oid=self.oid, reason=DRY)
+        else:
+            self.reported(message, wall)
+
+    def before_steps(self, due: int | None, wall: WallNs) -> None:
+        """No step of the stepper, or of another of its unit, is before tick `due`: it fires by then, if none comes."""
+        core = self._core
+        if due is None or self.firing or due <= core.soonest(wall) or self._axis.resting:
+            return
+        if self._alive and self._until is not None and self._until < due:
+            return
+        self._begin(wall)
+        self._put_off(min(due - 1, core.clock.tick_at(wall) + core.ticks(FAR)), wall)
+
+    def behind_steps(self, due: int | None, wall: WallNs) -> None:
+        """Every step before tick `due` has been sent (None: of all that it was told): it need not fire before.
+
+        That is said behind the steps: if they are late, so is this, and nothing is carried out of both.
+        """
+        core = self._core
+        if not self._alive or self.firing or self._until is None:
+            return
+        far = core.clock.tick_at(wall) + core.ticks(FAR)
+        if due is None or due > far:
+            if self._until < far - core.ticks(FAR // 2):
+                self._put_off(far, wall)
+        elif due - 1 > self._until:
+            self._put_off(due - 1, wall)
+        self._again = due is None or due > far
+
+    def _put_off(self, tick: int, wall: WallNs) -> None:
+        core = self._core
+        core.comes(tick)
+        core.command("trsync_set_timeout", oid=self.oid, clock=tick & MASK)
+        self._until = tick
+        before, present = self._before, core.clock.tick_at(wall) + core.ticks(UNSURE)
+        before.append((tick, core.link.said))
+        while len(before) > 1 and before[1][1] <= core.link.acknowledged and before[0][0] > present:
+            before.popleft()  # the next one came in time
+
+    def deadline(self) -> WallNs | None:
+        """When `behind_steps` is wanted, though nothing was sent."""
+        if not self._alive or self.firing or self._until is None or not self._again:
+            return None
+        return self._core.clock.wall_at(self._until) - FAR // 2
 
     def _quiet(self) -> None:
         """No more reports."""
         self._core.command("trsync_start", oid=self.oid, report_clock=0, report_ticks=0, expire_reason=0)
-        self._alive, self._quieting = False, 0
+        self._alive, self._until, self._since = False, None, None
 
     # -- what the firmware says
 
     def reported(self, message: Message, wall: WallNs) -> None:
         """A trsync_state came."""
-        if not self._alive:
+        known = self._core.known
+        if not self._alive or known < self._begun:
             return
-        if self._deaf:
-            self._ignored = True  # it may have been of this trigger: the next one says it again
-            return
-        self._blind = None
         if message.number("can_trigger"):
-            if self._quieting == 2:
+            while len(self._before) > 1 and self._before[1][1] <= known:
+                self._before.popleft()
+            # nothing is under way that could be late, or could stop it
+            if (
+                not self.armed
+                and not self.firing
+                and self._axis.resting
+                and known >= max(self._disarmed, self._axis.said)
+            ):
                 self._quiet()
             return
-        if self._firing is not None:
-            return
-        self._fired(message.number("trigger_reason"), wall)
+        if self._firing is None:
+            self._fired(message.number("trigger_reason"), wall)
 
     def _fired(self, reason: int, wall: WallNs) -> None:
         core = self._core
         watched = next((one for one in self._inputs.values() if one.reason == reason), None)
+        self._asked = False
         self._axis.halt()
         name = watched.setup.name if watched is not None else ""
         level = self._levels.get(name, True)
         levels: dict[str, bool] = {}
         self._firing = Stopped(core.setup.name, self.stepper, name, level, 0, 0, 0, level)
+        if reason == DRY:
+            ends = tuple(core.scale.later(self._axis.lag_at(tick)).time(tick) for tick, _ in self._before)
+            self._firing = self._firing._replace(dry=ends or (0,))
         self._changes.clear()
         for other in self._armed:
             self._off(self._inputs[other])

@@ -39,6 +39,7 @@ OF_STEPPERS: Words = {
     "stepper_stop_on_trigger": ("oid", "trsync_oid"),
     "config_trsync": ("oid",),
     "trsync_start": ("oid", "report_clock", "report_ticks", "expire_reason"),
+    "trsync_set_timeout": ("oid", "clock"),
     "trsync_trigger": ("oid", "reason"),
     "trsync_state": ("oid", "can_trigger", "trigger_reason", "clock"),
     "endstop_home": (
@@ -58,6 +59,7 @@ OF_INPUTS: Words = {
 OF_OUTS: Words = {
     "config_digital_out": ("oid", "pin", "value", "default_value", "max_duration"),
     "queue_digital_out": ("oid", "clock", "on_ticks"),
+    "update_digital_out": ("oid", "value"),
 }
 OF_UARTS: Words = {
     "config_tmcuart": ("oid", "rx_pin", "pull_up", "tx_pin", "bit_time"),

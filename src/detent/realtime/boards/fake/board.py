@@ -137,6 +137,10 @@ class FakeBoard:
     def _say(self, payload: bytes) -> None:
         self.sent.append((self.now + LATENCY, block(self._sequence, payload)))
 
+    def form(self, number: int) -> Format:
+        """The command with that number. KeyError."""
+        return self._commands[number]
+
     def _carry_out(self, payload: bytes) -> None:
         at = 0
         while at < len(payload) and not self.gone:
