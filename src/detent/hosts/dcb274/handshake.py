@@ -218,6 +218,7 @@ class SingleMode(Handshake):
         soon, and a silence only when it is longer than a ramp.
         """
         heard, wrong, others, began = b"", 0, 0, None
+        asked = not signed_on
         for _ in range(STOP_TRIES):
             yield Clear()
             answer = yield Ask(b"@", until(b"@"), self.patience)
@@ -252,7 +253,7 @@ class SingleMode(Handshake):
         if others or wrong:
             what = "answers its stop command with something else; it was told to stop, and may still move"
             raise BadAnswer(self.title, what, spoken, "abort() sends ESC")
-        if (yield from self.signs_on()):
+        if not asked and (yield from self.signs_on()):
             raise NoAnswer(self.title, RESET, spoken)
         what = "does not take its stop command: it is off, or the line is broken"
         raise NoAnswer(self.title, what, spoken, "abort() sends ESC")
