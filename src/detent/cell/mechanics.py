@@ -24,7 +24,7 @@ from detent.motors import kernel
 from detent.motors.drive import FAST, SLOW
 from detent.motors.excitation import Sequencer, at_once
 from detent.motors.motor import MotorError
-from detent.motors.rotor import Floats, Rig, Rotor
+from detent.motors.rotor import Floats, Rig, Rotor, load_kernel
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver
 from detent.ticks import NEVER, Ns
 from detent.uart import Char
@@ -65,6 +65,7 @@ class Mechanics:
         self.trace: Log[Floats] | None = Log() if record else None
         sequencer = Sequencer(rig.drive)
         rotor = Rotor(rig, sequencer, 0, SAMPLE)
+        load_kernel(rig)
         self._course = Course(rotor, sequencer)
         self._zero, self._pitch, self._step = rig.drive.winding.offset, rig.drive.winding.pitch, step
         self._supplied = True  # as far as the controller commands

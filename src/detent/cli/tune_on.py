@@ -98,6 +98,7 @@ def tune_on(
     from detent.realtime.trial_log import LogUnusable, TrialLog
     from detent.tuner.machine.bench import bench as bench_of
     from detent.tuner.machine.carriage import MachineError
+    from detent.tuner.machine.session import OtherRun
 
     try:
         law, begin = _settings(model, machine)
@@ -117,6 +118,8 @@ def tune_on(
         try:
             with TrialLog(path) as log:
                 result = _carried_out(found, plan, bench, log, machine, quiet=json)
+        except OtherRun as error:
+            asked_wrongly(f"{path}: {error}")
         except (MachineError, DriverError) as error:
             failed(f"{error}\n  the log is {path}; with the carriage on the witness the same command goes on from it")
         except LogUnusable as error:

@@ -182,9 +182,21 @@ class Rotor:
         return twin
 
 
+def load_kernel(rig: Rig) -> None:
+    """Have the compiled kernel there before it is wanted: its first call takes a while, seconds if nothing is kept.
+
+    A cell that is served has no such time in its first move, when hosts wait for answers.
+    """
+    if engine.fast() and not _loaded:
+        _loaded.append(True)
+        sequencer = Sequencer(rig.drive)
+        Rotor(rig, sequencer).run(sequencer.up_to(rig.substep), rig.substep)
+
+
 def substeps(span: Ns, changes: int, substep: Ns) -> int:
     """About how many substeps that takes."""
     return ceil(span / substep) + changes
 
 
+_loaded: list[bool] = []
 _NO_TRACE = np.zeros((0, kernel.COLUMNS))

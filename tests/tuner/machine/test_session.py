@@ -13,7 +13,7 @@ from detent.motors.load import Load
 from detent.motors.move import simulate
 from detent.motors.rotor import Rig
 from detent.tuner.machine.carriage import MachineError, Room
-from detent.tuner.machine.session import Plan, Result, left_safe
+from detent.tuner.machine.session import OtherRun, Plan, Result, left_safe
 
 SHORT = Room(travel=220, behind=40, turn=8, rate=400)
 SAFE = ("S=60", "T=400", "R=40")
@@ -128,7 +128,7 @@ class TestLog:
     def test_a_log_of_another_run_is_refused(self, whole: Whole) -> None:
         there, _ = whole
         bed = gsc200s()
-        with pytest.raises(MachineError, match=r"moves was \[160\] and is \[150\]"):
+        with pytest.raises(OtherRun, match=r"moves was \[160\] and is \[150\]"):
             bed.run(bed.plan(*SAFE, moves=(150,), room=SHORT, trials=1, confirm=1), there.records)
 
 

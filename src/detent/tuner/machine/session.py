@@ -13,6 +13,11 @@ from detent.tuner.machine.bench import Bench
 from detent.tuner.machine.carriage import Carriage, MachineError, Room
 from detent.tuner.machine.recipe import Found, Recipe, RecipeError, Trial, recipe
 
+
+class OtherRun(MachineError):
+    """A log that is none of this plan; nothing goes on from it."""
+
+
 MISHAPS = 3  # broken trials in a row that are made again
 TRIALS, CONFIRM = 3, 59
 
@@ -86,7 +91,7 @@ class Result:
 def replayed(plan: Plan, bench: Bench, past: Iterable[Record]) -> tuple[Recipe, Trial | Found, int, int]:
     """The recipe with the trials of a log in it: itself, what comes next, how many trials there were, and losses.
 
-    MachineError where the log is not that of this plan.
+    OtherRun where the log is not that of this plan.
     """
     made = plan.recipe(bench)
     records = iter(past)
@@ -99,7 +104,7 @@ def replayed(plan: Plan, bench: Bench, past: Iterable[Record]) -> tuple[Recipe, 
         if record.get("kind") != "trial":
             continue
         if not isinstance(ahead, Trial) or (record.get("knob"), record.get("steps")) != (ahead.knob, ahead.steps):
-            raise MachineError(f"trial {count + 1} of the log is not one of this plan: begin with another log")
+            raise OtherRun(f"trial {count + 1} of the log is not one of this plan: begin with another log")
         count += 1
         losses += bool(record["lost"])
         ahead = _sent(made, bool(record["lost"]))
@@ -120,7 +125,7 @@ def _same(there: Record, here: Record) -> None:
     wrong = [name for name in here if there.get(name) != here[name]]
     if wrong:
         told = ", ".join(f"{name} was {there.get(name)!r} and is {here[name]!r}" for name in wrong)
-        raise MachineError(f"the log is of another run: {told}. Give it the same, or another --log")
+        raise OtherRun(f"the log is of another run: {told}. Give it the same, or another --log")
 
 
 def run(plan: Plan, bench: Bench, record: Callable[[Record], object], past: Iterable[Record] = ()) -> Steps[Result]:
