@@ -9,7 +9,7 @@ from typing import Any
 import caproto
 import pytest
 from caproto import ChannelType, SubscriptionType
-from tests.bridges.test_epics_record import Bench
+from tests.bridges.record_bench import Bench
 
 from detent.bridges.epics.fields import Settings
 from detent.bridges.epics.ioc import ServedMotor, serve
