@@ -32,6 +32,7 @@ WRONG = {
     "const { missing } = window.detent;": "Property 'missing' does not exist",
     "export function untold(what) {\n  return what;\n}": "'what' implicitly has an 'any' type",
     'document.querySelector("p").remove();': "Object is possibly 'null'",
+    "try {\n  detent.keys();\n} catch (error) {\n  error.message;\n}": "'error' is of type 'unknown'",
 }
 
 

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { FORMS, grouped, pitch, seconds } from "./assets/forms.js";
+import { FORMS, grouped, pitch, seconds, wordsOf } from "./assets/forms.js";
 
 test("numbers stand in groups of three, with a real minus", () => {
   assert.equal(grouped(0), "0");
@@ -37,4 +37,10 @@ test("a scale is divided by 1, 2 or 5 into at most so many parts, and not into m
       assert.ok(span / step <= most * (1 + 1e-9), `${span} / ${most}: ${step} is too fine`);
       assert.ok(span / step > most / 2.6, `${span} / ${most}: ${step} is too coarse`);
     }
+});
+
+test("whatever was thrown has words", () => {
+  assert.equal(wordsOf(new Error("there is no unit")), "there is no unit");
+  assert.equal(wordsOf("no unit"), "no unit");
+  assert.equal(wordsOf(undefined), "undefined");
 });

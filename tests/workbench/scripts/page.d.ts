@@ -36,6 +36,8 @@ interface Detent {
   turnTime(): Promise<any>;
   turning(): boolean;
   toast(text: string, kind?: "note" | "error"): void;
+  /** Show what was thrown, as an error. */
+  failed(error: unknown): void;
   theme(): "dark" | "light";
   onTheme(heard: (theme: "dark" | "light") => void): End;
   remembered(name: string): any;

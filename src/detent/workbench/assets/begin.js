@@ -1,8 +1,9 @@
 // The page Begin: what can be opened, a new cell out of units and wires, the commands of a model.
 
 import { worded } from "./elements.js";
+import { wordsOf } from "./forms.js";
 
-const { part, call, toast, remembered, remember } = window.detent;
+const { part, call, toast, failed, remembered, remember } = window.detent;
 
 const AGAIN = 2000; // ms
 
@@ -51,12 +52,12 @@ part("begin", (box) => {
       await call("open_place", place);
       location.href = "/";
     } catch (error) {
-      toast(error.message, "error");
+      failed(error);
     }
   }
 
   async function places() {
-    const told = await call("places").catch((error) => toast(error.message, "error"));
+    const told = await call("places").catch(failed);
     if (!told) return;
     /**
      * @param {string} title
@@ -292,7 +293,7 @@ part("begin", (box) => {
     try {
       words = await call("new_cell", ready(), role("file").value.trim());
     } catch (error) {
-      words = error.message;
+      words = wordsOf(error);
       bad = true;
     }
     if (mine !== JSON.stringify(cell)) return;
@@ -343,8 +344,8 @@ part("begin", (box) => {
       places();
       return told;
     } catch (error) {
-      toast(/there already/.test(error.message) ? `${name} is there already. Click once more to replace it.` : error.message, "error");
-      armed = /there already/.test(error.message) ? name : "";
+      toast(/there already/.test(wordsOf(error)) ? `${name} is there already. Click once more to replace it.` : wordsOf(error), "error");
+      armed = /there already/.test(wordsOf(error)) ? name : "";
       return "";
     }
   }
@@ -383,7 +384,7 @@ part("begin", (box) => {
     role("unit-model").replaceChildren(...Object.keys(jacks).map((name) => new Option(name, name)));
     draw();
   }).catch((error) => {
-    toast(error.message, "error");
+    failed(error);
     if (box.isConnected) setTimeout(load, AGAIN);
   });
   load();

@@ -1,6 +1,6 @@
 // The panel "Break it" of the page Cell: a fault is chosen and set; those that stand are mended with a click.
 
-const { part, on, action, call, toast } = window.detent;
+const { part, on, action, call, failed } = window.detent;
 
 part("breaking", (box) => {
   const kinds = JSON.parse(box.dataset.kinds);
@@ -40,7 +40,7 @@ part("breaking", (box) => {
     try {
       await call("breaks", form.elements.where.value, form.elements.kind.value, given);
     } catch (error) {
-      toast(error.message, "error");
+      failed(error);
     }
   });
   choose();

@@ -2,7 +2,7 @@
 
 import { pitch } from "./forms.js";
 
-const { part, on, get, action, meant, underWay, make, call, toast, onTheme, theme, grouped } = window.detent;
+const { part, on, get, action, meant, underWay, make, call, toast, failed, onTheme, theme, grouped } = window.detent;
 
 // -- dials ----------------------------------------------------------------------------------------------
 
@@ -262,7 +262,7 @@ part("command", (form) => {
     try {
       await call("type", form.dataset.unit, text);
     } catch (error) {
-      toast(error.message, "error");
+      failed(error);
       if (!field.value) field.value = text; // to be mended
     }
   });

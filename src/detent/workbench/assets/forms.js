@@ -40,6 +40,12 @@ export const FORMS = {
 };
 
 /**
+ * What is wrong, in words, whatever was thrown.
+ * @param {unknown} error
+ */
+export const wordsOf = (error) => (error instanceof Error ? error.message : String(error));
+
+/**
  * Steps of 1, 2, 5 times a power of ten in which `span` has at most `most` parts.
  * @param {number} span
  * @param {number} most

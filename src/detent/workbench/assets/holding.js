@@ -1,6 +1,6 @@
 // A key that is held: the axis runs as long as it is, and stops when it is let go, or its window is out of sight.
 
-const { call, toast } = window.detent;
+const { call, failed } = window.detent;
 const HELD = 300; // ms between two words that a key is held
 
 /**
@@ -37,7 +37,7 @@ export function holding(buttons, { name, rate, sent, stopped }) {
     } catch (error) {
       if (timer !== mine) return;
       letGo(false);
-      toast(error.message, "error");
+      failed(error);
     }
   }
 

@@ -2,7 +2,7 @@
 
 import { holding } from "./holding.js";
 
-const { part, on, get, call, toast, remembered, remember } = window.detent;
+const { part, on, get, call, toast, failed, remembered, remember } = window.detent;
 
 part("manual", (box) => {
   const facts = JSON.parse(box.dataset.facts);
@@ -40,7 +40,7 @@ part("manual", (box) => {
       await there();
       told(await call("unit_move", name, what, value));
     } catch (error) {
-      toast(error.message, "error");
+      failed(error);
     }
   }
 
@@ -50,7 +50,7 @@ part("manual", (box) => {
     try {
       say(await stopping);
     } catch (error) {
-      toast(error.message, "error");
+      failed(error);
     }
   }
 
@@ -69,7 +69,7 @@ part("manual", (box) => {
     name: () => name,
     rate: (/** @type {Part} */ button) => {
       if (!get(`r.${name}`)) {
-        there().then(() => toast("Connected: hold the key once more."), (error) => toast(error.message, "error"));
+        there().then(() => toast("Connected: hold the key once more."), failed);
         return null;
       }
       const by = number(role("rate"));

@@ -8,6 +8,7 @@ import { Sending } from "./motion_sending.js";
 import { sliders } from "./motion_sliders.js";
 import { Tuning } from "./motion_tuning.js";
 import { element } from "./elements.js";
+import { wordsOf } from "./forms.js";
 import { showNumber, showSpan } from "./scope_plot.js";
 
 const MOVE_AFTER = 25,
@@ -421,7 +422,7 @@ export class Motion {
     try {
       found = await detent.call("motion_motor", this.request, this.form.asked());
     } catch (error) {
-      words = error.message;
+      words = wordsOf(error);
     }
     this.judging = false;
     if (this.closed) return;
@@ -549,7 +550,7 @@ export class Motion {
     try {
       return await detent.call(name, ...values);
     } catch (error) {
-      detent.toast(error.message, "error");
+      detent.failed(error);
       return undefined;
     }
   }

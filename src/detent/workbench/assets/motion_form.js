@@ -123,7 +123,7 @@ export class MotorForm {
     try {
       own.facts = await detent.call("motion_own", { name: own.name, text: own.text });
     } catch (error) {
-      detent.toast(error.message, "error");
+      detent.failed(error);
       return;
     }
     this.own = own;

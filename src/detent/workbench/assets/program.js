@@ -1,6 +1,7 @@
 /* The Program page: the text of a unit's program, its memory, and the debugger. What it knows of the language, and
    every check, comes from the server (detent/workbench/editing.py). */
 
+import { wordsOf } from "./forms.js";
 import { makeEditor } from "./program_editor.js";
 
 const CHECK_AFTER = 180,
@@ -196,7 +197,7 @@ class Program {
       () => {
         if (!this.unkept) this.root.dataset.draft = "kept";
       },
-      (error) => detent.toast(`The draft is not kept: ${error.message}`, "error"),
+      (error) => detent.toast(`The draft is not kept: ${wordsOf(error)}`, "error"),
     );
   }
 
@@ -581,8 +582,8 @@ class Program {
     try {
       return await detent.call(name, ...values);
     } catch (error) {
-      this.say(error.message, "bad");
-      detent.toast(error.message, "error");
+      this.say(wordsOf(error), "bad");
+      detent.failed(error);
       return undefined;
     }
   }

@@ -1,5 +1,7 @@
 // One STOP above every page, and Esc twice, for everything that says it can be stopped (detent.workbench.stopping).
 
+import { wordsOf } from "./forms.js";
+
 const { part, on, get, call, toast } = window.detent;
 const TWICE = 700; // ms between two presses of Esc
 const SOON = 2500; // ms in which most stops are confirmed; who stands at the machine is told no later that one is not
@@ -41,7 +43,8 @@ async function watch(stopping) {
     await stopping;
     if (mine === pressed) tell("");
   } catch (error) {
-    if (mine === pressed) tell(`STOP: ${error.message}${/switch off the supply/.test(error.message) ? "" : `. ${HELP}`}`);
+    const words = wordsOf(error);
+    if (mine === pressed) tell(`STOP: ${words}${/switch off the supply/.test(words) ? "" : `. ${HELP}`}`);
   } finally {
     clearTimeout(late);
   }

@@ -1,8 +1,9 @@
 // The page Terminal: rows of a line as they come, lines and scripts to send.
 
+import { wordsOf } from "./forms.js";
 import { bytes } from "./typed_bytes.js";
 
-const { part, on, frame, get, call, toast, seconds, remembered, remember } = window.detent;
+const { part, on, frame, get, call, toast, failed, seconds, remembered, remember } = window.detent;
 
 const MOST = 1500; // rows on the page
 const EVERY = 150; // ms between two looks at a line
@@ -162,7 +163,7 @@ part("terminal", (box) => {
       away.className = "key small";
       away.textContent = "Take back";
       away.setAttribute("aria-label", `Take back ${written}`);
-      away.addEventListener("click", () => call("withdraw", number).catch((error) => toast(error.message, "error")));
+      away.addEventListener("click", () => call("withdraw", number).catch(failed));
       row.append(who, what, away);
       return row;
     }));
@@ -216,7 +217,7 @@ part("terminal", (box) => {
       toEnd();
       look();
     } catch (error) {
-      toast(error.message, "error");
+      failed(error);
       if (!text.value) text.value = written; // to be mended
     }
   });
@@ -269,7 +270,7 @@ part("terminal", (box) => {
 
   function keepNow() {
     clearTimeout(kept);
-    if (unkept) call("keep_draft", ...unkept).catch((error) => toast(error.message, "error"));
+    if (unkept) call("keep_draft", ...unkept).catch(failed);
     unkept = null;
   }
 
@@ -297,12 +298,12 @@ part("terminal", (box) => {
     try {
       await call("run_script", line, unit, script.value).finally(() => (starting = false));
     } catch (error) {
-      role("told").textContent = error.message;
+      role("told").textContent = wordsOf(error);
       role("told").classList.add("bad");
     }
   });
-  role("repeats").addEventListener("click", () => call("stop_script", line).catch((error) => toast(error.message, "error")));
-  role("stop").addEventListener("click", () => call("stop_script", line).catch((error) => toast(error.message, "error")));
+  role("repeats").addEventListener("click", () => call("stop_script", line).catch(failed));
+  role("stop").addEventListener("click", () => call("stop_script", line).catch(failed));
   role("file").addEventListener("focus", async () => {
     const files = await call("files", [".txt", ".script"]).catch(() => []);
     box.querySelector("#scripts").replaceChildren(...files.map((/** @type {string} */ name) => new Option(name)));
@@ -324,7 +325,7 @@ part("terminal", (box) => {
       renumber();
       keep();
     } catch (error) {
-      toast(error.message, "error");
+      failed(error);
     }
   });
   role("save").addEventListener("click", async () => {
@@ -338,7 +339,7 @@ part("terminal", (box) => {
       toast(told.asks || `Saved: ${told.saved}`, told.asks ? "error" : "note");
       if (told.saved) keep();
     } catch (error) {
-      toast(error.message, "error");
+      failed(error);
     }
   });
 

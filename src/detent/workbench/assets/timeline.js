@@ -1,8 +1,8 @@
 // The time line: everything that is kept of the cell's past, with its marks. Dragging takes the cell there.
 
-import { pitch } from "./forms.js";
+import { pitch, wordsOf } from "./forms.js";
 
-const { part, on, frame, call, toast, seconds, get, turnTime } = window.detent;
+const { part, on, frame, call, failed, seconds, get, turnTime } = window.detent;
 
 /** @type {Record<string, string>} */
 const COLOURS = { error: "#ff6b5e", caution: "#ffd84d", power: "#ffb02e", action: "#7fe3d0", breakpoint: "#ff8ad0", stored: "#8fb8ff" };
@@ -120,7 +120,7 @@ part("timeline", (box) => {
       }
     } catch (error) {
       held = null;
-      toast(error.message, "error");
+      failed(error);
     }
     asking = false;
     if (dragging && held !== null && held !== get("now")) return;
@@ -248,12 +248,12 @@ part("futures", (dialog) => {
       take.className = "key small primary";
       take.textContent = "Take it again";
       compare.addEventListener("click", async () => {
-        const found = await call("compare_branch", number).catch((error) => [error.message]);
+        const found = await call("compare_branch", number).catch((error) => [wordsOf(error)]);
         told.textContent = found.join("\n");
       });
       take.addEventListener("click", () => {
         dialog.close();
-        call("take_branch", number).catch((error) => toast(error.message, "error"));
+        call("take_branch", number).catch(failed);
       });
       item.append(what, compare, take, told);
       return item;

@@ -1,9 +1,10 @@
 // The page Unit: the unit that is chosen, filled into the markup of detent/workbench/pages/unit.py.
 
 import { worded } from "./elements.js";
+import { wordsOf } from "./forms.js";
 import { holding } from "./holding.js";
 
-const { part, on, get, call, meant, make, toast, remembered, remember, seconds, grouped } = window.detent;
+const { part, on, get, call, meant, make, toast, failed, remembered, remember, seconds, grouped } = window.detent;
 
 /** @typedef {[string, string | null, string, boolean]} Told name, value, where it is from, whether it is a lamp */
 
@@ -34,7 +35,7 @@ part("unit", (box) => {
     try {
       return await action();
     } catch (error) {
-      toast(error.message, "error");
+      failed(error);
       return undefined;
     }
   };
@@ -467,7 +468,7 @@ part("unit", (box) => {
     try {
       tell(`Wrote ${await call("unit_backup", chosen, name, false)}`);
     } catch (error) {
-      if (!/there already/.test(error.message)) toast(error.message, "error");
+      if (!/there already/.test(wordsOf(error))) failed(error);
       else sure(role("backup"), `${name} is there already. Click once more to replace it.`, async () => {
         const told = await tried(() => call("unit_backup", chosen, name, true));
         if (told) tell(`Wrote ${told}`);

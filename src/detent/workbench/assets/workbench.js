@@ -1,7 +1,7 @@
 // What every page of the workbench shares: the live table and the markup bound to it, calls, help, theme, keyboard.
 // The conventions are told in detent/workbench/pages/__init__.py.
 
-import { FORMS, grouped, seconds } from "./forms.js";
+import { FORMS, grouped, seconds, wordsOf } from "./forms.js";
 import { Meanings } from "./meanings.js";
 
 /** @type {Map<string, any>} the live table, as far as this window knows it */
@@ -108,7 +108,7 @@ async function action(name, ...args) {
   try {
     return await call(name, ...args);
   } catch (error) {
-    toast(error.message, "error");
+    failed(error);
     return null;
   }
 }
@@ -322,6 +322,11 @@ function toast(text, kind = "note") {
   setTimeout(() => one.remove(), kind === "error" ? 9000 : 4000);
 }
 
+/** @type {Detent["failed"]} */
+function failed(error) {
+  toast(wordsOf(error), "error");
+}
+
 // -- actions by hand --------------------------------------------------------------------------------------
 
 /** @param {any} written */
@@ -481,7 +486,7 @@ function followTabs() {
 }
 
 window.detent = {
-  part, on, frame, call, action, turnTime, toast, onTheme, theme, remembered, remember, seconds, grouped,
+  part, on, frame, call, action, turnTime, toast, failed, onTheme, theme, remembered, remember, seconds, grouped,
   meant: (key, now = values.get(key)) => meanings.of(key, now),
   underWay: (key) => meanings.underWay(key),
   make: (key, value, going) => meanings.make(key, value, going),

@@ -20,7 +20,8 @@ A script is a module in ``assets/`` that the page names in its entry; it gets ho
 ``detent.part(NAME, setup)``: `setup` is called with every element that has ``data-part="NAME"`` when it appears and
 may return a function for its end. ``detent.on(PREFIX, f)`` calls f(key, value) for changes, ``detent.frame(f)`` once
 after each push, ``detent.get(KEY)`` tells a value, ``await detent.call(NAME, ...args)`` makes a call,
-``detent.toast(text, "error")`` says something, ``detent.onTheme(f)`` calls f("light" or "dark") now and at each change.
+``detent.toast(text, "error")`` says something, ``detent.failed(error)`` what was thrown,
+``detent.onTheme(f)`` calls f("light" or "dark") now and at each change.
 
 In Python, `Window.each_state` calls back at each push as long as the page is shown, and `Live.offer` adds a call for
 scripts; what a call raises is shown to the person who made it.
