@@ -45,15 +45,15 @@ def test_cell_files_are_read_beside_the_loop_and_each_once_for_as_long_as_it_sta
     def cells() -> Any:
         return asyncio.run(begin.places())["cells"]
 
-    assert cells() == [["a.toml", "A"], ["b.toml", "B"]]
+    assert cells() == [("a.toml", "A"), ("b.toml", "B")]
     assert read == [("a.toml", False), ("b.toml", False), ("wrong.toml", False)]
     read.clear()
-    assert cells() == [["a.toml", "A"], ["b.toml", "B"]]
+    assert cells() == [("a.toml", "A"), ("b.toml", "B")]
     assert read == []
     (tmp_path / "b.toml").write_text(CELL.format("C"))
     os.utime(tmp_path / "b.toml", ns=(1, 1))
     (tmp_path / "a.toml").unlink()
-    assert cells() == [["b.toml", "C"]]
+    assert cells() == [("b.toml", "C")]
     assert read == [("b.toml", False)]
 
 

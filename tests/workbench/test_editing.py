@@ -97,7 +97,7 @@ def test_without_a_source_the_text_is_what_memory_holds(editing: Editing, bench:
 
 def test_a_text_is_checked_with_addresses_labels_and_memory_use(editing: Editing) -> None:
     found = run(editing.check("bar", SOURCE))
-    assert found["places"] == [[1, 0, 2], [2, 2, 4], [3, 6, 2]]  # W1, +250 and U1 take 2, 4 and 2 bytes
+    assert found["places"] == [(1, 0, 2), (2, 2, 4), (3, 6, 2)]  # W1, +250 and U1 take 2, 4 and 2 bytes
     assert found["labels"] == {"again": 0}
     assert (found["used"], found["capacity"], found["errors"], found["loaded"]) == (8, 119, [], False)
 
@@ -105,7 +105,7 @@ def test_a_text_is_checked_with_addresses_labels_and_memory_use(editing: Editing
 def test_errors_are_told_with_their_place_while_the_rest_keeps_its_addresses(editing: Editing) -> None:
     found: dict[str, Any] = run(editing.check("bar", "W1\nT10000\n+250\n"))
     (error,) = found["errors"]
-    assert error[:3] == [2, 2, 5]
+    assert error[:3] == (2, 2, 5)
     assert "1 to 1000" in error[3]
     assert [place[0] for place in found["places"]] == [1, 3]
 

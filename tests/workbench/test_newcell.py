@@ -129,7 +129,7 @@ def test_places_are_models_examples_and_the_cells_of_the_folder(tmp_path: Path) 
             await begin.save_cell("drilling.toml", cell)
         await begin.save_cell("drilling.toml", cell, over=True)
         places: Any = await begin.places()
-        assert places["cells"] == [["drilling.toml", "Drilling"]]
+        assert places["cells"] == [("drilling.toml", "Drilling")]
         assert [f"{EXAMPLE}drilling/bar-after-bar.toml"] == [one for one, _ in places["examples"] if "bar-after" in one]
         for place in ("drilling.toml", places["examples"][0][0], "dcb-274"):
             await begin.open_place(place)

@@ -27,6 +27,9 @@ needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is no
 
 WRONG = {
     "detent.call();": "Expected at least 1 arguments",
+    'detent.call("holt");': "'\"holt\"' is not assignable to parameter of type 'keyof Calls'",
+    'detent.call("power", "bar");': "Expected 3 arguments",
+    'detent.call("places").then((found) => found.modles);': "Property 'modles' does not exist on type 'Places'",
     'detent.talk("x");': "Property 'talk' does not exist",
     'import { grouped } from "./forms.js";\ngrouped("7");': "not assignable to parameter of type 'number'",
     "const { missing } = window.detent;": "Property 'missing' does not exist",
@@ -44,7 +47,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     for n, wrong in enumerate(WRONG):
         (folder / "assets" / f"wrong{n}.js").write_text(f"{wrong}\n")
     options = json.loads((SCRIPTS / "jsconfig.json").read_text())
-    options["include"] = ["assets/*.js", str(SCRIPTS / "page.d.ts")]
+    options["include"] = ["assets/*.js", *map(str, SCRIPTS.glob("*.d.ts"))]
     (folder / "jsconfig.json").write_text(json.dumps(options))
     done = subprocess.run([TSC, "-p", folder / "jsconfig.json"], capture_output=True, text=True)
     assert done.returncode != 0

@@ -17,6 +17,7 @@ from detent.motors.named import MOTORS
 from detent.realtime.examples import home
 from detent.realtime.images import cell_name
 from detent.realtime.texts import read_text
+from detent.workbench.answers import Command, Fittings, Places
 from detent.workbench.drafts import Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
@@ -49,15 +50,15 @@ class Beginning:
         ):
             live.offer(call.__name__, call)
 
-    async def places(self) -> dict[str, object]:
+    async def places(self) -> Places:
         """What can be opened: models, examples with their titles, cells in the folder; which is open."""
         examples, cells = await asyncio.to_thread(self._read)
         return {
             "open": self._bench.picture.target,
-            "models": [[name, model.title] for name, model in catalogue.MODELS.items()],
-            "examples": [[EXAMPLE + name, title] for name, title in examples],
+            "models": [(name, model.title) for name, model in catalogue.MODELS.items()],
+            "examples": [(EXAMPLE + name, title) for name, title in examples],
             "folder": str(self._folder.root),
-            "cells": [list(cell) for cell in cells],
+            "cells": cells,
         }
 
     def _read(self) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
@@ -89,7 +90,7 @@ class Beginning:
         """For each model, parts too, what wires lead from and to."""
         return await asyncio.to_thread(jacks)
 
-    async def fittings(self) -> dict[str, object]:
+    async def fittings(self) -> Fittings:
         """What units of a new cell can have: motors, by name; axes of each model that moves something, and programs.
 
         `supplies`: the V to begin with for a motor; in `direct` of the models that put the supply through the winding.
@@ -121,7 +122,7 @@ class Beginning:
         self._folder.write(name, text.encode())
         return name
 
-    async def command_reference(self, model: Name) -> list[dict[str, str]]:
+    async def command_reference(self, model: Name) -> list[Command]:
         """The commands of a model, from its table."""
         return [
             {"command": row.command, "argument": row.argument, "what": row.what, "section": row.section}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field
 
 from detent.assembler import ImageError
+from detent.workbench.answers import CheckedProgram, ComparedProgram, ProgramFacts
 from detent.workbench.drafts import LONGEST
 from detent.workbench.live import Live
 from detent.workbench.programs import Checked, Program
@@ -49,7 +50,7 @@ class Editing:
 
     # -- the text ------------------------------------------------------------------------------------------
 
-    async def about(self, unit: Name) -> dict[str, object]:
+    async def about(self, unit: Name) -> ProgramFacts:
         """What the editor must know of a unit, and the text that it begins with where there is no draft."""
         program, picture = self._program(unit), self._bench.picture.units[unit]
         source = self._bench.sources.get(unit, "")
@@ -74,12 +75,12 @@ class Editing:
             "file": picture.file, "source": source, "line": picture.line,
         }  # fmt: skip
 
-    async def check(self, unit: Name, text: Text) -> dict[str, object]:
+    async def check(self, unit: Name, text: Text) -> CheckedProgram:
         """Errors, addresses and labels of a text, and whether it is what program memory holds."""
         checked = await asyncio.to_thread(self._program(unit).check, text)
         return {
-            "errors": [[wrong.line, wrong.column, wrong.length, wrong.message] for wrong in checked.errors],
-            "places": [[line, place.address, len(place.code)] for line, place in checked.places.items()],
+            "errors": [(wrong.line, wrong.column, wrong.length, wrong.message) for wrong in checked.errors],
+            "places": [(line, place.address, len(place.code)) for line, place in checked.places.items()],
             "labels": dict(checked.labels), "used": checked.used, "capacity": checked.capacity,
             "loaded": not checked.errors and await self._holds(unit, checked),
         }  # fmt: skip
@@ -98,7 +99,7 @@ class Editing:
         """Keep program memory without supply, by the unit's own command. What it answered."""
         return await self._bench.save(unit)
 
-    async def compare(self, unit: Name, text: Text, kept: bool) -> dict[str, object]:
+    async def compare(self, unit: Name, text: Text, kept: bool) -> ComparedProgram:
         """Read memory back (`kept`: what is kept without supply): the lines that differ, and words for it."""
         checked = await self._sound(unit, text)
         image = await self._bench.read_back(unit, kept=kept)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from detent.workbench.answers import DraftText, Written
 from detent.workbench.drafts import LONGEST, Draft, Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
@@ -22,7 +23,7 @@ def offer(live: Live, folder: Folder, drafts: Drafts) -> None:
     async def read_file(name: Name) -> str:
         return folder.read_text(name)
 
-    async def write_file(name: Name, text: Text, known: Text | None = None, over: bool = False) -> dict[str, str]:
+    async def write_file(name: Name, text: Text, known: Text | None = None, over: bool = False) -> Written:
         """Write it, unless a file of that name says something else than `known`: then ask. `over`: write it."""
         if (
             not over
@@ -39,9 +40,9 @@ def offer(live: Live, folder: Folder, drafts: Drafts) -> None:
         folder.write(name, text.encode())
         return {"saved": name}
 
-    async def draft(name: Name) -> dict[str, str] | None:
+    async def draft(name: Name) -> DraftText | None:
         found = drafts.get(name)
-        return None if found is None else found._asdict()
+        return None if found is None else {"text": found.text, "file": found.file}
 
     async def keep_draft(name: Name, text: Text, file: Name = "") -> None:
         drafts.keep(name, Draft(text, file))

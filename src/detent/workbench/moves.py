@@ -14,9 +14,10 @@ from detent.motors.motor import Motor, MotorError
 from detent.motors.named import MOTORS
 from detent.motors.own import read as read_own
 from detent.moves import laws
-from detent.moves.law import Law, clipped, in_force, stepping
+from detent.moves.law import Law, Setting, clipped, in_force, stepping
 from detent.realtime.cell_source import find_cell
 from detent.workbench import motion, rigs
+from detent.workbench.answers import AxisFacts, DrawnMove, JudgedMove, MotorFacts, SettingFacts
 from detent.workbench.live import Live
 from detent.workbench.motion import Floats, Picture
 from detent.workbench.rigs import Form, OwnMotor
@@ -104,7 +105,7 @@ class Moves:
                  for fact in self._told(place.unit)["facts"] if fact[1] is not None}  # fmt: skip
         return found | {f"{axis} {letter}": value for letter, value in found.items()} if axis else found
 
-    async def about(self, place: Place) -> dict[str, object]:
+    async def about(self, place: Place) -> AxisFacts:
         """The settings of an axis with their ranges and what is in force, the motors, and the one that is fitted."""
         law = self.law(place)
         _, _, axis = self._unit(place)
@@ -114,17 +115,17 @@ class Moves:
             "unit": place.unit, "axis": place.axis, "real": place.real, "options": dict(place.options),
             "model": law.model, "law": law.title, "units": law.unit,
             "most": law.most, "steps": min(FIRST_STEPS, law.most),
-            "settings": [setting._asdict() for setting in law.settings],
+            "settings": [_setting(setting) for setting in law.settings],
             "values": dict(in_force(law, registers, axis)),
             "steppings": [winding.name for winding in law.windings],
             "per_step": {winding.name: winding.steps for winding in law.windings},
             "stepping": stepping(law, registers, axis),
             "drives": rigs.DRIVES,
             "motors": [rigs.facts_of(name, motor) for name, motor in self.motors().items()],
-            "fitted": None if entry is None else {"name": entry[0], **rigs.form_of(law, *entry)},
+            "fitted": None if entry is None else rigs.form_of(law, *entry),
         }  # fmt: skip
 
-    async def move(self, wanted: Axis) -> dict[str, object]:
+    async def move(self, wanted: Axis) -> DrawnMove:
         """The picture of a move, and the command lines that make it."""
         law = self.law(wanted)
         values, steps = clipped(law, wanted.values), min(wanted.steps, law.most)
@@ -134,7 +135,7 @@ class Moves:
         return {
             "values": dict(values), "steps": steps, "times": _numbers(drawn.times, 9),
             "speeds": _numbers(drawn.speeds, 4), "positions": _numbers(drawn.positions, 4),
-            "accelerations": [[round(t, 9), round(a, 1)] for t, a in zip(at.tolist(), accelerations.tolist(),
+            "accelerations": [(round(t, 9), round(a, 1)) for t, a in zip(at.tolist(), accelerations.tolist(),
                                                                          strict=True)],
             "duration": drawn.duration, "peak": round(drawn.peak, 3), "mean": round(drawn.mean, 3),
             "up": drawn.ramps[0], "down": drawn.duration * 1e-9 - drawn.ramps[1], "reached": drawn.reached,
@@ -142,13 +143,13 @@ class Moves:
             "settings": list(commands.settings), "go": commands.go,
         }  # fmt: skip
 
-    async def motor(self, wanted: Axis, form: Form) -> dict[str, object]:
+    async def motor(self, wanted: Axis, form: Form) -> JudgedMove:
         """What a motor makes of a move: its torque over speed, what the move asks of it, and the verdict."""
         law = self.law(wanted)
         async with self._one:
             return await asyncio.to_thread(_judged, law, wanted, form, self.motors(), self.entry(wanted))
 
-    async def own(self, files: OwnMotor) -> dict[str, object]:
+    async def own(self, files: OwnMotor) -> MotorFacts:
         """What a form begins with for a motor of somebody's own. MotorError says what is wrong with its file."""
         motor, _ = read_own(files.text, files.name)
         return rigs.facts_of(files.name, motor)
@@ -178,7 +179,7 @@ class Moves:
 
 def _judged(
     law: Law, wanted: Axis, form: Form, motors: Mapping[str, Motor], fitted: tuple[str, Fitted] | None
-) -> dict[str, object]:
+) -> JudgedMove:
     """Everything that is shown of a motor. Raises MotorError."""
     found_rig = rigs.made(law, form, motors, fitted)
     rig = found_rig.rig
@@ -187,24 +188,34 @@ def _judged(
     per_step = rig.drive.winding.steps
     curve = motion.torque_curve(rig, drawn.peak / per_step)
     asked = motion.demand(drawn, rig)
-    found: dict[str, object] = {
-        "curve": [[point.rate * per_step, round(point.torque, 6)] for point in curve],
-        "asked": [[float(speed), round(float(torque), 6)] for speed, torque in zip(*asked, strict=True)],
+    found: JudgedMove = {
+        "curve": [(point.rate * per_step, round(point.torque, 6)) for point in curve],
+        "asked": [(float(speed), round(float(torque), 6)) for speed, torque in zip(*asked, strict=True)],
         "travel": found_rig.travel,
         "turn": rig.motor.steps,
+        "verdict": None,
+        "words": "",
     }
     try:
         judgement = motion.judgement(train, rig)
     except MotorError as error:
-        return found | {"verdict": None, "words": str(error)}
+        return {**found, "words": str(error)}
     verdict, rate = judgement.verdict, judgement.rate
-    return found | {
+    return {
+        **found,
         "verdict": {
             "lost": verdict.lost, "margin": verdict.margin, "angle": verdict.load_angle, "error": verdict.error,
             "often": 0 if rate is None else rate.lost + rate.corners_lost,
             "of": 0 if rate is None else rate.tried + rate.corners,
         },
         "words": " ".join(filter(None, (judgement.words(rig), found_rig.words and f"Motor: {found_rig.words}."))),
+    }  # fmt: skip
+
+
+def _setting(setting: Setting) -> SettingFacts:
+    return {
+        "name": setting.name, "title": setting.title, "unit": setting.unit, "low": setting.low, "high": setting.high,
+        "value": setting.value, "scale": setting.scale,
     }  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from detent.motors.rotor import Rig
 from detent.motors.winding import Winding
 from detent.moves.law import Law
 from detent.workbench import motion
+from detent.workbench.answers import FittedMotor, MotorFacts
 
 Name = Annotated[str, Field(max_length=200)]
 File = Annotated[str, Field(max_length=200_000)]
@@ -155,7 +156,7 @@ def own_motor(files: OwnMotor, supply: float, current: float, drive: str, windin
 # -- what a form begins with ------------------------------------------------------------------------------------
 
 
-def form_of(law: Law, name: str, entry: Fitted) -> dict[str, object]:
+def form_of(law: Law, name: str, entry: Fitted) -> FittedMotor:
     """The form for a motor as a cell file has it."""
     current = entry.current
     if current is None:
@@ -165,6 +166,7 @@ def form_of(law: Law, name: str, entry: Fitted) -> dict[str, object]:
     load = load_of(entry)
     travel = Mechanics(**entry.mechanics).travel
     return {
+        "name": name,
         "motor": named(name, entry),
         "stepping": entry.step if entry.step in [winding.name for winding in law.windings] else "",
         "supply": entry.supply, "current": amps, "inertia": load.inertia * 1e4, "friction": load.friction,
@@ -173,7 +175,7 @@ def form_of(law: Law, name: str, entry: Fitted) -> dict[str, object]:
     }  # fmt: skip
 
 
-def facts_of(name: str, motor: Motor) -> dict[str, object]:
+def facts_of(name: str, motor: Motor) -> MotorFacts:
     """The form for a motor by name."""
     return {
         "name": name, "title": motor.title, "supply": SUPPLY, "current": motor.current,

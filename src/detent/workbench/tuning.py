@@ -9,6 +9,7 @@ import json
 import os
 import sys
 from asyncio.subprocess import DEVNULL, PIPE, Process
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -20,6 +21,7 @@ from detent.tuner.spaces import Point
 from detent.tuner.task import Task, moves_of
 from detent.tuner.told import option_lines
 from detent.workbench import rigs
+from detent.workbench.answers import PickedSettings
 from detent.workbench.live import Live
 from detent.workbench.moves import Axis, Moves
 from detent.workbench.pipe import packed
@@ -98,18 +100,18 @@ class Tuning:
             process.stdin.write(STOP)
             await process.stdin.drain()
 
-    async def pick(self, x: int, y: int) -> dict[str, object]:
+    async def pick(self, x: int, y: int) -> PickedSettings:
         """The settings at a place of the map, given by its two values: what would be sent, and how long moves take."""
         task, point = self._task, self._point
         if task is None or point is None:
             raise ValueError("there is no map: search first")
         async with self._picking:
-            return self._without_spare(await asyncio.to_thread(_picked, task, point, x, y))
+            found = await asyncio.to_thread(_picked, task, point, x, y)
+        return {**found, "commands": self._needed(found["commands"]), "resets": self._needed(found["resets"])}
 
-    def _without_spare(self, found: dict[str, Any]) -> dict[str, Any]:
+    def _needed(self, lines: Sequence[str]) -> list[str]:
         """Without a reset to the step size that the board has."""
-        return {**found, **{part: [line for line in found[part] if line != self._spare]
-                            for part in ("commands", "resets")}}  # fmt: skip
+        return [line for line in lines if line != self._spare]
 
     async def _read(self, process: Process) -> None:
         assert process.stdout is not None
@@ -138,7 +140,9 @@ class Tuning:
             self._tell(done=done, total=total, best=best, doing=doing, left=left)
         elif "found" in said:
             self._point = tuple(said["point"])
-            self._live.put({"tuning.found": self._without_spare(said["found"])})
+            found = said["found"]
+            needed = {part: self._needed(found[part]) for part in ("commands", "resets")}
+            self._live.put({"tuning.found": {**found, **needed}})
             if said["found"]["complete"]:
                 self._began = asyncio.get_running_loop().time()
                 self._tell(state="mapping", done=0, total=0, doing="map", left=None)
@@ -163,7 +167,7 @@ def ranges_of(text: str) -> dict[str, float | tuple[float, float]]:
     return found
 
 
-def _picked(task: Task, point: Point, x: int, y: int) -> dict[str, Any]:
+def _picked(task: Task, point: Point, x: int, y: int) -> PickedSettings:
     judge = judge_of(task)
     here = judge.space.on_plane(point, x, y)
     found = judge.trains(here) if judge.space.admits(here) else None
@@ -171,7 +175,7 @@ def _picked(task: Task, point: Point, x: int, y: int) -> dict[str, Any]:
         raise ValueError("there are no such settings: a start speed above the slew speed, or a table that cannot be")
     profile, _ = found
     return {
-        "settings": dict(profile.values), "options": dict(profile.options), "part": list(profile.part),
+        "settings": dict(profile.values), "options": dict(profile.options), "part": profile.part,
         "commands": list(profile.settings), "go": [profile.go(move.steps) for move in task.moves],
         "times": list(judge.times(here) or ()), "time": judge.time(here), "settings_words": str(profile),
         "option_lines": option_lines(profile), "resets": list(profile.before),

@@ -1,4 +1,5 @@
-// What a script of the workbench finds on its page: what `workbench.js` shares with all, and what NiceGUI brings.
+// What a script of the workbench finds on its page: what `workbench.js` shares with all, and what NiceGUI brings. What calls
+// are answered with is in `calls.d.ts`.
 
 /** Told when a key of the live table has another value, and at once for those that there are. Its end stops that. */
 type Heard = (key: string, value: any) => void;
@@ -27,9 +28,9 @@ interface Detent {
   get(key: string): any;
   keys(): Iterable<string>;
   /** Make a call to the process of the pages. Throws what it says is wrong. */
-  call(name: string, ...args: any[]): Promise<any>;
+  call<Name extends keyof Calls>(name: Name, ...args: Parameters<Calls[Name]>): Promise<ReturnType<Calls[Name]>>;
   /** The same by hand: what is wrong is shown, and nothing is thrown. */
-  action(name: string, ...args: any[]): Promise<any>;
+  action<Name extends keyof Calls>(name: Name, ...args: Parameters<Calls[Name]>): Promise<ReturnType<Calls[Name]> | null>;
   meant(key: string, now?: any): any;
   underWay(key: string): boolean;
   make<T>(key: string, value: any, going: () => Promise<T>): Promise<T>;
@@ -47,56 +48,7 @@ interface Detent {
   forms: Record<string, (value: any) => string>;
 }
 
-// -- what the pages Motion and Scope are told (detent/workbench/moves.py, scope_feed.py) --
-
-interface Setting {
-  name: string;
-  title: string;
-  unit: string;
-  low: number;
-  high: number;
-  scale: number;
-}
-
-/** An axis: its law and its settings. */
-interface About {
-  unit: string;
-  axis: string;
-  real: boolean;
-  model: string;
-  law: string;
-  units: string;
-  most: number;
-  steps: number;
-  settings: Setting[];
-  values: Record<string, number>;
-  options: Record<string, string>;
-  steppings: string[];
-  per_step: Record<string, number>;
-  stepping: string;
-  drives: string[];
-  motors: any[];
-  fitted: any;
-}
-
-/** A move drawn: at `times` in s the speed and the position; accelerations are [at, value]. */
-interface Move {
-  settings: string[];
-  go: string;
-  steps: number;
-  times: number[];
-  speeds: number[];
-  positions: number[];
-  accelerations: Point[];
-  /** ns */
-  duration: number;
-  peak: number;
-  mean: number;
-  up: number;
-  down: number;
-  reached: boolean;
-  remark: string;
-}
+// -- what the page Scope is told (detent/workbench/scope_feed.py) --
 
 type Point = [number, number];
 type Colour = (name: string) => string;
@@ -149,24 +101,6 @@ interface Frame {
   trigger: number | null;
   marks?: { at: number }[];
   traces: Columns[];
-}
-
-// -- what the page Program is told (detent/workbench/editing.py) --
-
-/** A command as it is spelt, and what the table says of it. `whole`: no letter may follow. */
-interface Word {
-  spelling: string;
-  whole: boolean;
-  rows: Row[];
-}
-
-interface Row {
-  form: string;
-  takes: string;
-  what: string;
-  bytes: number;
-  section: string;
-  stored: boolean;
 }
 
 interface Window {

@@ -358,7 +358,7 @@ part("begin", (box) => {
 
   // -- commands --
 
-  /** @type {Record<string, string>[]} */
+  /** @type {Command[]} */
   let rows = [];
   async function commands() {
     rows = await call("command_reference", role("model").value).catch(() => []);

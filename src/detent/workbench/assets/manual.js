@@ -34,7 +34,7 @@ part("manual", (box) => {
   /** @param {string[]} lines */
   const told = (lines) => say(lines.length ? `sent ${lines.join(", ")}` : "nothing had to be sent");
 
-  /** @param {string} what */
+  /** @param {"jog" | "go" | "zero" | "home"} what */
   async function move(what, value = 0) {
     try {
       await there();

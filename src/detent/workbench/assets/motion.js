@@ -35,9 +35,9 @@ export class Motion {
     this.judged = null;
     /** @type {{text: string, kind: string} | null} */
     this.said = null;
-    /** @type {any} the axis: an About, once there is one */
+    /** @type {any} the axis: an AxisFacts, once there is one */
     this.about = null;
-    /** @type {Move | null} */
+    /** @type {DrawnMove | null} */
     this.move = null;
     this.steps = 1;
     /** @type {Record<string, number>} */
@@ -284,14 +284,14 @@ export class Motion {
       t = small ? 1e3 : 1,
       right = seconds * t * 1.02;
     /**
-     * @param {(move: Move) => Point[]} points
+     * @param {(move: DrawnMove) => Point[]} points
      * @param {string} colour
      */
     const lines = (points, colour) => [
       ...(kept ? [{ points: points(kept.move), colour: "--ink-3", dash: [6, 4], width: 1.5, label: "A" }] : []),
       { points: points(move), colour, fill: !kept, label: kept ? "this move" : "" },
     ];
-    /** @param {(one: Move) => number} of */
+    /** @param {(one: DrawnMove) => number} of */
     const top = (of) => Math.max(...both.map(of)) || 1;
     this.charts.speed.draw({
       right,
@@ -329,7 +329,7 @@ export class Motion {
   }
 
   /**
-   * @param {Move} move
+   * @param {DrawnMove} move
    * @param {number} most
    */
   facts(move, most) {
@@ -363,11 +363,11 @@ export class Motion {
     for (const key of ["swap", "drop"]) this.find(`[data-key=${key}]`).hidden = !kept;
     place.hidden = !kept;
     if (!kept || !move) return;
-    /** @param {Move} one */
+    /** @param {DrawnMove} one */
     const speed = (one) => `${showNumber(+(one.peak / this.scale.by).toPrecision(5))} ${this.scale.unit}/s`;
     /**
      * @param {string} name
-     * @param {Move} one
+     * @param {DrawnMove} one
      * @param {any} verdict
      */
     const row = (name, one, verdict, more = "") =>
@@ -520,7 +520,7 @@ export class Motion {
 
   /**
    * What a key does, with the move that is meant and not with the one that was drawn last.
-   * @param {(move: Move) => any} act
+   * @param {(move: DrawnMove) => any} act
    */
   async whenSettled(act) {
     const move = await this.settled();
@@ -530,7 +530,7 @@ export class Motion {
   /**
    * The same for what goes to a unit: nothing does if the settings that are meant are no commands.
    * @param {string} key
-   * @param {(move: Move) => any} act
+   * @param {(move: DrawnMove) => any} act
    */
   async whenSendable(key, act) {
     const move = await this.settled();
@@ -543,8 +543,10 @@ export class Motion {
   }
 
   /**
-   * @param {string} name
-   * @param {...any} values
+   * @template {keyof Calls} Name
+   * @param {Name} name
+   * @param {Parameters<Calls[Name]>} values
+   * @returns {Promise<ReturnType<Calls[Name]> | undefined>}
    */
   async ask(name, ...values) {
     try {

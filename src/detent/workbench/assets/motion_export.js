@@ -80,8 +80,8 @@ function picture(motion) {
   pen.fillStyle = colour("--ink");
   pen.font = `600 14px ${colour("--sans")}`;
   const { move, kept, about } = motion,
-    said = (/** @type {Move} */ one) => [...one.settings, one.go].join(" ");
-  pen.fillText(`${about.unit} (${about.model}): ${said(/** @type {Move} */ (move))}${kept ? `   A: ${said(kept.move)}` : ""}`, 12, 20, copy.width / ratio - 24);
+    said = (/** @type {DrawnMove} */ one) => [...one.settings, one.go].join(" ");
+  pen.fillText(`${about.unit} (${about.model}): ${said(/** @type {DrawnMove} */ (move))}${kept ? `   A: ${said(kept.move)}` : ""}`, 12, 20, copy.width / ratio - 24);
   pen.font = `12px ${colour("--sans")}`;
   pen.fillStyle = colour("--ink-2");
   pen.fillText(`${motion.form.title} ${(motion.said || {}).text || ""}`, 12, 42, copy.width / ratio - 24);

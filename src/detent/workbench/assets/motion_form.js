@@ -5,6 +5,8 @@ import { element } from "./elements.js";
 const NUMBERS = ["supply", "current", "inertia", "friction", "damping"],
   MOVED = ["size", "gear", "mass", "slope", "force", "drag"];
 
+/** @typedef {Pick<MotorFacts, keyof MotorFacts & keyof FittedMotor> & Partial<MotorFacts & FittedMotor>} AnyMotor by name, or fitted */
+
 export class MotorForm {
   /**
    * @param {Part} root
@@ -14,9 +16,9 @@ export class MotorForm {
     this.form = root.querySelector("form.motion-form");
     this.fields = this.form.elements;
     this.changed = changed;
-    /** @type {{name: string, text: string, curve: string, curve_name: string, facts: any} | null} */
+    /** @type {{name: string, text: string, curve: string, curve_name: string, facts: MotorFacts} | null} */
     this.own = null;
-    /** @type {About | null} */
+    /** @type {AxisFacts | null} */
     this.about = null;
     this.form.addEventListener("input", (event) => this.touched(/** @type {any} */ (event.target).name));
     this.form.addEventListener("submit", (event) => event.preventDefault());
@@ -30,10 +32,10 @@ export class MotorForm {
   get title() {
     const { motor } = this.fields;
     if (!motor.value) return "no motor chosen";
-    return `${motor.value === "fitted" ? this.about?.fitted.name : motor.value === "own" ? this.own?.name : motor.value}:`;
+    return `${motor.value === "fitted" ? this.about?.fitted?.name : motor.value === "own" ? this.own?.name : motor.value}:`;
   }
 
-  /** @param {About} about */
+  /** @param {AxisFacts} about */
   fill(about) {
     const { motors, fitted, drives } = about,
       { motor, drive } = this.fields;
@@ -55,7 +57,7 @@ export class MotorForm {
     this.takeMotor();
   }
 
-  /** @param {About} about */
+  /** @param {AxisFacts} about */
   steppings(about) {
     const { stepping } = this.fields,
       before = stepping.value;
@@ -64,6 +66,7 @@ export class MotorForm {
     stepping.value = about.steppings.includes(before) ? before : about.stepping;
   }
 
+  /** @returns {AnyMotor | null | undefined} */
   get found() {
     const { motor } = this.fields;
     if (motor.value === "own") return this.own?.facts;
@@ -76,7 +79,7 @@ export class MotorForm {
     for (const field of this.fields) if (!["motor", "files"].includes(field.name)) field.disabled = !found;
     const wirings = found && named ? found.wirings : [];
     fields.wiring.replaceChildren(
-      ...wirings.map((/** @type {string} */ name) => element("option", { value: name }, name === found.wiring ? `${name} (as sold)` : name)),
+      ...wirings.map((/** @type {string} */ name) => element("option", { value: name }, name === found?.wiring ? `${name} (as sold)` : name)),
     );
     if (found) fields.wiring.value = found.wiring || "";
     this.form.querySelector("[data-role=wiring]").hidden = !wirings.length;
@@ -119,14 +122,13 @@ export class MotorForm {
       detent.toast("A file of a motor has at most 200 kB", "error");
       return;
     }
-    const own = { facts: null, name: toml.name, text: await toml.text(), curve: csv ? await csv.text() : "", curve_name: csv ? csv.name : "" };
+    const own = { name: toml.name, text: await toml.text(), curve: csv ? await csv.text() : "", curve_name: csv ? csv.name : "" };
     try {
-      own.facts = await detent.call("motion_own", { name: own.name, text: own.text });
+      this.own = { ...own, facts: await detent.call("motion_own", { name: own.name, text: own.text }) };
     } catch (error) {
       detent.failed(error);
       return;
     }
-    this.own = own;
     this.fields.motor.querySelector("[value=own]")?.remove();
     this.fields.motor.prepend(element("option", { value: "own" }, `${own.name} (own)`));
     this.fields.motor.value = "own";

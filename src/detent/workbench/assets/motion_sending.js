@@ -37,7 +37,7 @@ export class Sending {
 
   /**
    * Show the lines with what is to be known of them; whether they shall be sent to the unit of `about`.
-   * @param {About} about
+   * @param {AxisFacts} about
    * @param {string[]} lines
    */
   shown(about, lines, words = "") {
@@ -59,7 +59,7 @@ export class Sending {
    * refused.
    * @param {string[]} lines
    */
-  async send(/** @type {About} */ { unit, real }, lines) {
+  async send(/** @type {AxisFacts} */ { unit, real }, lines) {
     const sent = [];
     if (real) {
       // one job of the unit: STOP, in whichever window, ends all of it

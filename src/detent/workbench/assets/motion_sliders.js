@@ -3,7 +3,7 @@
 
 import { element } from "./elements.js";
 
-/** @typedef {Setting & {get: () => number, set: (value: number) => void}} Row */
+/** @typedef {Omit<SettingFacts, "value"> & {get: () => number, set: (value: number) => void}} Row */
 
 const NOTCHES = 1000; // of a slider
 /** @type {Record<string, number>} */
@@ -13,7 +13,7 @@ const WIDE = 50; // from so many times the least on, a slider counts in proporti
 /**
  * A row for each setting and for the length of the move. `of`: values (changed in place), steps() and move(steps) for the
  * length, changed() after each change.
- * @param {About} about
+ * @param {AxisFacts} about
  * @param {{values: Record<string, number>, steps: () => number, move: (steps: number) => void, changed: () => void}} of
  */
 export function sliders(about, of) {

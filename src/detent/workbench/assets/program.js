@@ -14,11 +14,12 @@ class Program {
   /** @param {Part} root */
   constructor(root) {
     this.root = root;
-    /** @type {any} what `program_about` gave */
-    this.facts = null;
+    /** @type {ProgramFacts & {draft: string}} of the unit that is shown: none before `show` */
+    this.facts = /** @type {any} */ (null);
     this.file = "";
-    this.saved = ""; // the text as it is in the file, or in the cell's own source
-    /** @type {any} what `program_check` gave */
+    /** @type {string | null} the text as it is in the file, or in the cell's own source; null: not known */
+    this.saved = "";
+    /** @type {CheckedProgram | null} */
     this.checked = null;
     /** @type {number[]} lines that memory has otherwise */
     this.different = [];
@@ -117,9 +118,9 @@ class Program {
   async show(unit) {
     const mine = (this.showing += 1);
     delete this.root.dataset.checked;
-    const facts = await this.ask("program_about", unit);
-    if (!facts || this.closed || mine !== this.showing) return;
-    facts.draft = facts.language ? unit : `script.${facts.line}`; // a script is that of the Terminal page
+    const about = await this.ask("program_about", unit);
+    if (!about || this.closed || mine !== this.showing) return;
+    const facts = { ...about, draft: about.language ? unit : `script.${about.line}` }; // a script is that of the Terminal page
     this.flush(); // what was typed so far is of the unit before, whose draft it is
     const draft = await this.ask("draft", facts.draft);
     if (this.closed || mine !== this.showing) return;
@@ -155,7 +156,7 @@ class Program {
   commands() {
     const box = this.root.querySelector(".program-commands"),
       wanted = box.querySelector("input").value.toLowerCase().split(/\s+/).filter(Boolean),
-      rows = [...new Map(this.facts.words.flatMap((/** @type {Word} */ word) => word.rows).map((/** @type {Row} */ row) => [JSON.stringify(row), row])).values()],
+      rows = [...new Map(this.facts.words.flatMap((word) => word.rows).map((row) => [JSON.stringify(row), row])).values()],
       found = rows.filter((row) => wanted.every((/** @type {string} */ word) => [row.form, row.takes, row.what, row.section].join(" ").toLowerCase().includes(word)));
     box.querySelector("table").replaceChildren(
       ...found.map((row) => {
@@ -220,11 +221,11 @@ class Program {
     const first = this.checked === null || (found.loaded && !this.checked.loaded);
     this.checked = found;
     this.memory = detent.get(`u.${unit}.memory`);
-    this.lines = new Map(found.places.map((/** @type {Point} */ [line, address]) => [address, line]));
-    this.addresses = new Map(found.places.map((/** @type {Point} */ [line, address]) => [line, address]));
+    this.lines = new Map(found.places.map(([line, address]) => [address, line]));
+    this.addresses = new Map(found.places.map(([line, address]) => [line, address]));
     this.editor.check(found);
     this.at.errors.replaceChildren(
-      ...found.errors.map((/** @type {[number, number, number, string]} */ [line, column, , message]) => {
+      ...found.errors.map(([line, column, , message]) => {
         const button = document.createElement("button"),
           item = document.createElement("li"),
           where = document.createElement("b");
@@ -239,8 +240,8 @@ class Program {
     const part = found.used / found.capacity;
     this.at.used.textContent = `${found.used} of ${found.capacity} bytes`;
     this.at.meter.style.setProperty("--part", String(Math.min(part, 1)));
-    this.at.meter.setAttribute("aria-valuenow", found.used);
-    this.at.meter.setAttribute("aria-valuemax", found.capacity);
+    this.at.meter.setAttribute("aria-valuenow", String(found.used));
+    this.at.meter.setAttribute("aria-valuemax", String(found.capacity));
     this.at.meter.classList.toggle("full", part > 1);
     this.at.loaded.textContent = found.errors.length
       ? `${found.errors.length} error${found.errors.length > 1 ? "s" : ""}`
@@ -349,14 +350,14 @@ class Program {
   toggleBreakpoint(line) {
     if (!this.facts.language) return;
     const place = this.placed(line),
+      address = place === undefined ? place : this.addresses.get(place),
       { breakLines } = this.editor;
-    if (!this.checked || !this.checked.loaded || place === undefined) {
+    if (!this.checked || !this.checked.loaded || address === undefined) {
       const at = breakLines.includes(place) ? place : line;
       this.setBreakpoints(breakLines.includes(at) ? breakLines.filter((/** @type {number} */ other) => other !== at) : [...breakLines, at]);
       return;
     }
     const { unit } = this.facts,
-      address = this.addresses.get(place),
       before = detent.meant(this.breaksKey) || [],
       on = !before.includes(address),
       after = on ? [...before, address].sort((a, b) => a - b) : before.filter((/** @type {number} */ other) => other !== address);
@@ -465,20 +466,20 @@ class Program {
       step: () => this.ask("step_instruction", unit),
       back: () => this.ask("step_back", unit),
       cursor: () => {
-        const place =
-          this.checked && [...this.addresses.keys()].sort((a, b) => a - b).find((line) => line >= editor.line);
-        if (!place) detent.toast("There is no instruction at the cursor or behind it.", "error");
-        else if (!this.checked.loaded) detent.toast("Load the program first.", "error");
-        else this.ask("program_run_to", unit, this.addresses.get(place));
+        const lines = this.checked ? [...this.addresses.keys()].sort((a, b) => a - b) : [],
+          address = this.addresses.get(lines.find((line) => line >= editor.line) ?? 0);
+        if (address === undefined) detent.toast("There is no instruction at the cursor or behind it.", "error");
+        else if (!this.checked?.loaded) detent.toast("Load the program first.", "error");
+        else this.ask("program_run_to", unit, address);
       },
       break: () => this.toggleBreakpoint(editor.line),
       errors: () => {
         const on = !detent.meant("breakerrors");
         return detent.make("breakerrors", on, () => this.ask("break_on_errors", on));
       },
-      send: () => this.ask("run_script", facts.line, unit, editor.text),
-      "send-line": () => this.ask("run_script", facts.line, unit, editor.text.split("\n")[editor.line - 1]),
-      stop: () => this.ask("stop_script", facts.line),
+      send: () => this.ask("run_script", facts.line ?? "", unit, editor.text),
+      "send-line": () => this.ask("run_script", facts.line ?? "", unit, editor.text.split("\n")[editor.line - 1]),
+      stop: () => this.ask("stop_script", facts.line ?? ""),
     };
   }
 
@@ -575,8 +576,10 @@ class Program {
 
   /**
    * A call; its error is shown, and undefined comes back.
-   * @param {string} name
-   * @param {...any} values
+   * @template {keyof Calls} Name
+   * @param {Name} name
+   * @param {Parameters<Calls[Name]>} values
+   * @returns {Promise<ReturnType<Calls[Name]> | undefined>}
    */
   async ask(name, ...values) {
     try {

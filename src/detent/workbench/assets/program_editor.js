@@ -23,7 +23,7 @@ class Editor {
    */
   constructor(place, told) {
     this.told = told;
-    /** @type {{words: Word[], comment: string, language: boolean}} */
+    /** @type {{words: Spelling[], comment: string, language: boolean}} */
     this.facts = { words: [], comment: ";", language: true };
     /** @type {Record<string, number>} */
     this.labels = {};

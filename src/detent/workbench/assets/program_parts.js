@@ -4,7 +4,7 @@
  * Cut a line into labels ([where, length]), the command with what follows (`rest`, from `start` on; `word` if the language has it),
  * and the comment (where it begins, -1: none); `code` is the line without it.
  * @param {string} text
- * @param {{comment: string, language: boolean, words: Word[]}} facts without a language there are no labels
+ * @param {{comment: string, language: boolean, words: Spelling[]}} facts without a language there are no labels
  */
 export function cut(text, { comment, language, words }) {
   const end = text.indexOf(comment),

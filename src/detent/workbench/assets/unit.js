@@ -30,6 +30,8 @@ part("unit", (box) => {
 
   const names = () => get("r.names") || [];
   const now = () => (chosen === null ? null : get(`r.${chosen}`));
+  /** The unit that is shown; "" for none, which every call refuses. */
+  const shown = () => chosen ?? "";
   /** @param {() => any} action */
   const tried = async (action) => {
     try {
@@ -223,11 +225,11 @@ part("unit", (box) => {
     return made;
   }
 
-  role("again").addEventListener("click", () => tried(() => call("unit_again", chosen)));
-  role("leave").addEventListener("click", () => tried(() => call("unit_leave", chosen)));
+  role("again").addEventListener("click", () => tried(() => call("unit_again", shown())));
+  role("leave").addEventListener("click", () => tried(() => call("unit_leave", shown())));
   const paused = () => meant(`r.${chosen}.paused`, now().paused);
   /** @param {boolean} pause */
-  const ask = (pause) => make(`r.${chosen}.paused`, pause, () => tried(() => call("unit_asking", chosen, pause, Number(role("rates").value))));
+  const ask = (pause) => make(`r.${chosen}.paused`, pause, () => tried(() => call("unit_asking", shown(), pause, Number(role("rates").value))));
   role("pause").addEventListener("click", () => ask(!paused()));
   role("rates").addEventListener("change", () => ask(paused()));
 
@@ -275,11 +277,11 @@ part("unit", (box) => {
   }
 
   /**
-   * @param {string} what
+   * @param {"jog" | "go" | "zero" | "home"} what
    * @param {number} value
    */
   async function hand(what, value) {
-    const sent = await tried(() => call("unit_move", chosen, what, value));
+    const sent = await tried(() => call("unit_move", shown(), what, value));
     if (sent) role("sent").textContent = sent.length ? `sent ${sent.join(", ")}` : "nothing had to be sent";
   }
 
@@ -294,7 +296,7 @@ part("unit", (box) => {
   role("zero").addEventListener("click", (event) => sure(event.currentTarget, "Click once more: where the axis stands is 0 then.", () => hand("zero", 0)));
   role("home").addEventListener("click", (event) => sure(event.currentTarget, `Click once more: the axis goes until it meets a switch. ${now().can.before_home}`,
     () => hand("home", Number(role("direction").value))));
-  role("stop").addEventListener("click", () => stopped(call("unit_stop", chosen)));
+  role("stop").addEventListener("click", () => stopped(call("unit_stop", shown())));
 
   /** @param {Promise<string>} stopping */
   async function stopped(stopping) {
@@ -341,7 +343,7 @@ part("unit", (box) => {
       return;
     }
     asking = true;
-    const mine = chosen;
+    const mine = shown();
     try {
       do {
         again = false;
@@ -385,7 +387,7 @@ part("unit", (box) => {
     role("text").value = "";
     hint();
     const other = role("beside").value;
-    const told = await tried(() => (other ? call("unit_both", [chosen, other], line) : call("unit_say", chosen, line)));
+    const told = await tried(() => (other ? call("unit_both", [chosen, other], line) : call("unit_say", shown(), line)));
     if (!told) {
       if (!role("text").value) role("text").value = line; // to be mended
       return;
@@ -435,7 +437,7 @@ part("unit", (box) => {
   role("read").addEventListener("click", async () => {
     const read = async () => {
       const before = source();
-      const text = await tried(() => call("unit_source", chosen));
+      const text = await tried(() => call("unit_source", shown()));
       if (text === undefined) return;
       if (source() !== before) {
         tell("The text here was changed meanwhile, so it was not replaced by the program of the unit.");
@@ -448,11 +450,11 @@ part("unit", (box) => {
     else read();
   });
   role("compare").addEventListener("click", async () => {
-    const lines = await tried(() => call("unit_compare", chosen, source()));
+    const lines = await tried(() => call("unit_compare", shown(), source()));
     if (lines) tell(lines.length ? lines.join("\n") : "the unit holds this program");
   });
   role("store").addEventListener("click", (event) => sure(event.currentTarget, "Click once more: the program in the unit is replaced by this one. It is not started.", async () => {
-    const told = await tried(() => call("unit_store", chosen, source(), role("save").checked));
+    const told = await tried(() => call("unit_store", shown(), source(), role("save").checked));
     if (told) tell(told);
   }));
 
@@ -466,18 +468,18 @@ part("unit", (box) => {
     const name = file();
     role("file").value = name;
     try {
-      tell(`Wrote ${await call("unit_backup", chosen, name, false)}`);
+      tell(`Wrote ${await call("unit_backup", shown(), name, false)}`);
     } catch (error) {
       if (!/there already/.test(wordsOf(error))) failed(error);
       else sure(role("backup"), `${name} is there already. Click once more to replace it.`, async () => {
-        const told = await tried(() => call("unit_backup", chosen, name, true));
+        const told = await tried(() => call("unit_backup", shown(), name, true));
         if (told) tell(`Wrote ${told}`);
       });
     }
   });
   let differed = "";
   role("differs").addEventListener("click", async () => {
-    const told = await tried(() => call("unit_differs", chosen, file()));
+    const told = await tried(() => call("unit_differs", shown(), file()));
     if (!told) return;
     differed = told.seen;
     role("restore").hidden = !told.lines.length;
@@ -485,7 +487,7 @@ part("unit", (box) => {
   });
   role("restore").addEventListener("click", async () => {
     role("restore").hidden = true;
-    const told = await tried(() => call("unit_restore", chosen, file(), differed));
+    const told = await tried(() => call("unit_restore", shown(), file(), differed));
     if (told) tell(told.join("\n"));
   });
 

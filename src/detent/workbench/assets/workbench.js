@@ -361,7 +361,7 @@ function listenForActions() {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const at = origin(event);
     if (at.closest("input, textarea, select, [contenteditable], .cm-editor, [role=dialog]")) return;
-    /** @type {Record<string, string>} */
+    /** @type {Record<string, "step_event" | "step_back" | "slower" | "faster">} */
     const keys = { ".": "step_event", ",": "step_back", "[": "slower", "]": "faster" };
     if (event.key === " ") {
       if (at.closest("button, a, summary")) return; // it is theirs

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from detent.controllers.gsc200 import commands as gsc200
 from detent.ticks import SECOND
+from detent.workbench.answers import LineRow, LineTalk
 from detent.workbench.icons import icon
 from detent.workbench.line_scripts import LineScripts
 from detent.workbench.live import Live
@@ -49,7 +50,7 @@ def offer(site: "FastAPI", bench: "Bench", live: Live) -> None:
     """The calls of this page: rows of a line, scripts."""
     scripts = LineScripts(bench, live)
 
-    async def terminal(line: str, since: int = 0) -> dict[str, object]:
+    async def terminal(line: str, since: int = 0) -> LineTalk:
         talk = bench.terminal(line, since)
         rows = talk.rows[-MOST_ROWS:]
         first = rows[0].number if rows else talk.first
@@ -68,7 +69,7 @@ def offer(site: "FastAPI", bench: "Bench", live: Live) -> None:
         live.offer(call.__name__, call)
 
 
-def _row(row: Row) -> dict[str, object]:
+def _row(row: Row) -> LineRow:
     """A row as a window draws it."""
     return {
         "number": row.number,
@@ -77,7 +78,7 @@ def _row(row: Row) -> dict[str, object]:
         "note": row.note,
         "wrong": row.wrong,
         "whole": row.whole,
-        "parts": [[part.kind, part.text, part.meaning, part.data.hex(" ")] for part in row.parts],
+        "parts": [(part.kind, part.text, part.meaning, part.data.hex(" ")) for part in row.parts],
     }
 
 

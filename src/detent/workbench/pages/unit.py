@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from detent.realtime.connect import HOSTS
+from detent.workbench.answers import UnitPlaces
 from detent.workbench.icons import icon
 from detent.workbench.pages import Page, Window
 from detent.workbench.units.unit import RATES
@@ -35,14 +36,14 @@ def offer(site: "FastAPI", bench: "Bench", live: "Live") -> None:
     from detent.realtime.finding import listed
     from detent.workbench.units.beside import emulated
 
-    async def unit_places() -> dict[str, object]:
+    async def unit_places() -> UnitPlaces:
         try:
             ports = await asyncio.to_thread(listed)
         except PortError:  # none can be listed here; a port of another computer can be named
             ports = []
         return {
-            "ports": [[port.device, port.what] for port in ports],
-            "cell": [list(unit) for unit in emulated(bench.picture)],
+            "ports": [(port.device, port.what) for port in ports],
+            "cell": emulated(bench.picture),
         }
 
     live.offer("unit_places", unit_places)

@@ -20,7 +20,9 @@ from detent.hosts.axis import Axis
 from detent.hosts.backups import Backup, BackupError
 from detent.hosts.errors import told
 from detent.hosts.exchange import Steps
+from detent.hosts.typed import Said
 from detent.outputs.files import write_whole
+from detent.workbench.answers import BackupDifferences, LineSaid, UnitRow, UnitTalk
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
 from detent.workbench.stopping import Stopping
@@ -153,39 +155,38 @@ class Units:
 
     # -- the line ----------------------------------------------------------------------------------------
 
-    async def unit_say(self, name: Name, line: Line) -> dict[str, object]:
+    async def unit_say(self, name: Name, line: Line) -> LineSaid:
         """A line as it is typed; what came of it."""
         return await self._said(self._unit(name), line)
 
-    async def unit_lines(self, name: Name, lines: Sequence[Line]) -> list[dict[str, object]]:
+    async def unit_lines(self, name: Name, lines: Sequence[Line]) -> list[LineSaid]:
         """Several lines, one after the other; what came of each. Nothing follows one that is refused, nor a STOP."""
-        unit = self._unit(name)
-        return [{"unit": name, **said._asdict()} for said in await unit.say_lines(lines)]
+        return [_line_said(name, said) for said in await self._unit(name).say_lines(lines)]
 
-    async def unit_both(self, names: Sequence[Name], line: Line) -> list[dict[str, object]]:
+    async def unit_both(self, names: Sequence[Name], line: Line) -> list[LineSaid]:
         """The same line to several units at once; what came of it at each, an error too."""
         units = [self._unit(name) for name in names]
         return list(await asyncio.gather(*(self._tried(unit, line) for unit in units)))
 
-    async def _tried(self, unit: Unit, line: str) -> dict[str, object]:
+    async def _tried(self, unit: Unit, line: str) -> LineSaid:
         try:
             return await self._said(unit, line)
         except (RuntimeError, ValueError, OSError) as error:
-            return {"unit": unit.name, "answers": [], "meaning": told(error), "refused": True, "ms": None}
+            return _line_said(unit.name, Said((), told(error), refused=True))
 
-    async def _said(self, unit: Unit, line: str) -> dict[str, object]:
+    async def _said(self, unit: Unit, line: str) -> LineSaid:
         said, seconds = await unit.say(line)
-        return {"unit": unit.name, **said._asdict(), "ms": round(1000 * seconds, 1)}
+        return _line_said(unit.name, said, round(1000 * seconds, 1))
 
-    async def unit_talk(self, name: Name, since: int = 0) -> dict[str, object]:
+    async def unit_talk(self, name: Name, since: int = 0) -> UnitTalk:
         """Rows of what was said, as the page Terminal has them."""
         transcript = self._unit(name).tap.transcript
         talk = transcript.since(since)
-        rows = [
+        rows: list[UnitRow] = [
             {
                 "number": row.number, "begin": row.begin, "sender": row.sender, "note": row.note, "wrong": row.wrong,
                 "question": row.number in transcript.questions,
-                "parts": [[part.kind, part.text, part.meaning, part.data.hex(" ")] for part in row.parts],
+                "parts": [(part.kind, part.text, part.meaning, part.data.hex(" ")) for part in row.parts],
             }
             for row in talk.rows[-400:]
         ]  # fmt: skip
@@ -245,7 +246,7 @@ class Units:
         self._folder.write(file, backup.text(explained(unit.model)).encode())
         return file
 
-    async def unit_differs(self, name: Name, file: Name) -> dict[str, object]:
+    async def unit_differs(self, name: Name, file: Name) -> BackupDifferences:
         """What restoring a file changes in a unit; `seen` goes with `unit_restore`."""
         unit = self._unit(name)
         wanted = self._wanted(unit, file)
@@ -282,6 +283,11 @@ class Units:
         if saved is None:
             raise ValueError(f"a {unit.model} keeps nothing that it tells: what it knows is burnt into its EPROM")
         return backup_of(unit.model, unit.address, await unit.perform("reading what it keeps", saved()))
+
+
+def _line_said(unit: str, said: Said, ms: float | None = None) -> LineSaid:
+    return {"unit": unit, "answers": said.answers, "meaning": said.meaning, "refused": said.refused,
+            "meanings": said.meanings, "ms": ms}  # fmt: skip
 
 
 def _axis(unit: Unit) -> Axis:
