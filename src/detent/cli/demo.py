@@ -74,7 +74,7 @@ def demo(
     _print_end(cell, told, files, place)
 
 
-class Told(NamedTuple):
+class StoryLine(NamedTuple):
     """One line of the timeline. Without a unit it is the script's."""
 
     at_ns: int
@@ -101,13 +101,13 @@ def _comments(description: "Description", read: Callable[[str], str]) -> dict[st
     return comments
 
 
-def _story(cell: "Cell", description: "Description", comments: Mapping[str, Mapping[int, str]]) -> Iterator[Told]:
+def _story(cell: "Cell", description: "Description", comments: Mapping[str, Mapping[int, str]]) -> Iterator[StoryLine]:
     """Who moved, who waited, who switched what, in order of time."""
     from detent.controllers.device import Executing
     from detent.ticks import MS
 
     lines = [
-        Told(entry.at, "", "", f"{switch} switch set to {level}", 0)
+        StoryLine(entry.at, "", "", f"{switch} switch set to {level}", 0)
         for entry in description.script
         for switch, level in entry.set.items()
     ]
@@ -120,7 +120,7 @@ def _story(cell: "Cell", description: "Description", comments: Mapping[str, Mapp
             waits_or_moves = step.instruction[0] in "W+-G" and end - step.at > MS
             if waits_or_moves or step.instruction[0] == "A":
                 comment = comments[unit].get(step.address, "")
-                lines.append(Told(step.at, unit, step.instruction, comment, end - step.at))
+                lines.append(StoryLine(step.at, unit, step.instruction, comment, end - step.at))
     return iter(sorted(lines, key=lambda line: line.at_ns))
 
 
@@ -152,7 +152,7 @@ def _handshake() -> "list[Pin]":
     ]
 
 
-def _print_story(description: "Description", told: list[Told]) -> None:
+def _print_story(description: "Description", told: list[StoryLine]) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -175,7 +175,7 @@ def _print_story(description: "Description", told: list[Told]) -> None:
     console.print(table)
 
 
-def _print_end(cell: "Cell", told: list[Told], files: Mapping[str, Path], place: Path) -> None:
+def _print_end(cell: "Cell", told: list[StoryLine], files: Mapping[str, Path], place: Path) -> None:
     from detent.cli import outcome
     from detent.ticks import SECOND
 

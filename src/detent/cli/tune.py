@@ -362,7 +362,7 @@ def _say_what_is_missing(answers: "list[Tuned]", moves: "Sequence[Move]", files:
 
 def _facts(tuned: "Tuned", made: Made) -> dict[str, Any]:
     from detent.motors import gpu
-    from detent.tuner.told import facts
+    from detent.tuner.report import facts
 
     return {**facts(tuned), "assumed": list(made.words), "gpu": gpu.used()}
 
@@ -386,7 +386,7 @@ def _print(answers: "list[Tuned]", made: Made) -> None:
 
 def _print_one(tuned: "Tuned") -> None:
     from detent.cli.motor import print_table, table_of
-    from detent.tuner.told import fails_words, models_words, option_lines
+    from detent.tuner.report import fails_words, models_words, option_lines
 
     task, found, profile = tuned.task, tuned.found, tuned.found.profile
     if not found.whole:

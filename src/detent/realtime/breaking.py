@@ -20,7 +20,7 @@ _ON_LINES: Final[Mapping[str, type[BitErrors | LostCharacters | Delay | CableOut
 }
 
 
-def meant(names: Names, given: Mapping[str, object]) -> Fault:
+def fault_of(names: Names, given: Mapping[str, object]) -> Fault:
     """The fault that is meant by the arguments of the verb `fault`. Raises AskedWrongly."""
     kind, where = str(given["kind"]), str(given["where"])
     if kind not in verbs.FAULTS:
@@ -54,8 +54,8 @@ def level(given: Mapping[str, object]) -> Level:
     return found
 
 
-def told(cell: Cell, fault: Fault) -> dict[str, Json]:
-    """A fault as it was asked for."""
+def arguments_of(cell: Cell, fault: Fault) -> dict[str, Json]:
+    """The arguments of the verb `fault` that a fault was asked for with."""
     match fault:
         case OnLine(line, what):
             kind = next(name for name, made in _ON_LINES.items() if made is type(what))

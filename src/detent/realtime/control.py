@@ -193,7 +193,7 @@ class Control:
         cell = self._cell
         listed: list[Json] = []
         for number, fault in cell.faults.standing.items():
-            found: dict[str, Json] = {"fault": number, **breaking.told(cell, fault)}
+            found: dict[str, Json] = {"fault": number, **breaking.arguments_of(cell, fault)}
             tally = cell.faults.tally(number)
             if tally is not None:
                 found |= {"met": tally.met, "struck": tally.struck}
@@ -427,7 +427,7 @@ class Control:
     def _fault(self, given: Given) -> Answer:
         lasting = given.get("for")
         assert lasting is None or isinstance(lasting, int)
-        self._subject.do(Break(breaking.meant(self._names, given), lasting))
+        self._subject.do(Break(breaking.fault_of(self._names, given), lasting))
         return {"fault": self._cell.faults.last, **self._now()}
 
     def _mend(self, given: Given) -> Answer:

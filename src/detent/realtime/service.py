@@ -197,7 +197,7 @@ class Service:
         self._loop.stop()
 
     def journal(self) -> tuple[int, Sequence[TimedAction]]:
-        """How many deeds are forgotten, and those behind them."""
+        """How many actions are forgotten, and those behind them."""
         return self.cell.journal.forgotten, list(self.cell.journal)
 
     def standing(self) -> Answer:

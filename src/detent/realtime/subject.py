@@ -62,7 +62,7 @@ class Subject(Protocol):
         """How late its deadlines were served."""
 
     def journal(self) -> tuple[int, Sequence[TimedAction]]:
-        """How many deeds are forgotten, and those behind them."""
+        """How many actions are forgotten, and those behind them."""
 
     def standing(self) -> Answer:
         """What else there is to say about its time."""

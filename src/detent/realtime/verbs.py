@@ -116,13 +116,13 @@ PACE: Final = Kind('a number above 0, or "free"', _pace, {"oneOf": [{"type": "nu
 
 
 class Parameter(NamedTuple):
-    """An argument of a verb. `several`: it takes what is left, as one text with blanks between."""
+    """An argument of a verb. `rest`: it takes what is left, as one text with blanks between."""
 
     name: str
     kind: Kind
     help: str
     required: bool = False
-    several: bool = False
+    rest: bool = False
 
 
 class Verb(NamedTuple):
@@ -194,9 +194,9 @@ VERBS: Final[Mapping[str, Verb]] = {
         Verb("pace", "How many times as fast as real time the cell goes; free: as fast as it can.",
              (Parameter("pace", PACE, "a factor, or free", True),)),
         Verb("type", "The host of a unit sends it a command line; address, checksum and end are added.",
-             (Parameter("text", TEXT, "the command line", True, several=True), UNIT), placed=1),
+             (Parameter("text", TEXT, "the command line", True, rest=True), UNIT), placed=1),
         Verb("send", "The host of a line sends characters as they are.",
-             (Parameter("data", TEXT, "characters; \\r, \\n and \\x1b are written so", True, several=True),
+             (Parameter("data", TEXT, "characters; \\r, \\n and \\x1b are written so", True, rest=True),
               Parameter("line", TEXT, "a line; may be left out where there is only one")), placed=1),
         Verb("clear", "What waits to be sent on a line is dropped. A character that has begun ends.",
              (Parameter("line", TEXT, "a line; may be left out where there is only one"),)),

@@ -274,7 +274,7 @@ class DrivenEngine(Engine):
         """Do it to the machine's cell, now, whatever is looked at."""
         self._driven.cell.do(action)
         self._driven.run_to(self._driven.now)
-        self._marks.deed(self._driven.cell, action)
+        self._marks.action(self._driven.cell, action)
         self._quiet = False
 
     def _sends_now(self) -> bool:

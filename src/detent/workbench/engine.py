@@ -497,7 +497,7 @@ class Engine:
         found = VERBS["fault"].read(given)
         lasting = found.get("for")
         assert lasting is None or isinstance(lasting, int)
-        fault = breaking.meant(Names(self.history.cell), found)
+        fault = breaking.fault_of(Names(self.history.cell), found)
         self.do(Break(fault, lasting))
         return self.history.cell.faults.last
 
@@ -526,7 +526,7 @@ class Engine:
     def do(self, action: Action) -> None:
         """Do it, now; what does not show itself gets its mark. Raises what `History.do` does."""
         self.history.do(action)
-        self._marks.deed(self.history.cell, action)
+        self._marks.action(self.history.cell, action)
         self._quiet = False
         if self._pace.held:
             self._pace.hold(self.now)

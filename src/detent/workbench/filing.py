@@ -27,7 +27,7 @@ def offer(live: Live, folder: Folder, drafts: Drafts) -> None:
         """Write it, unless a file of that name says something else than `known`: then ask. `over`: write it."""
         if (
             not over
-            and (there := folder.told(name)) is not None
+            and (there := folder.content(name)) is not None
             and there not in (text.encode(), (known or "").encode())
         ):
             own = known is not None

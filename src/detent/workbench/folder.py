@@ -51,7 +51,7 @@ class Folder:
             raise ValueError(f"{name} has more than {LARGEST >> 20} MiB: that is no file for the workbench")
         return path.read_bytes()
 
-    def told(self, name: str) -> bytes | None:
+    def content(self, name: str) -> bytes | None:
         """What is in a file, of a very long one how it begins; None if there is none. Raises OutsideFolder, OSError."""
         path = self.path(name)
         if not path.is_file():

@@ -83,7 +83,7 @@ class Governed:
         return self.pace.lateness.summary()
 
     def journal(self) -> tuple[int, Sequence[TimedAction]]:
-        """How many deeds are forgotten, and those behind them, up to where it stands."""
+        """How many actions are forgotten, and those behind them, up to where it stands."""
         return self._engine.history.journal()
 
     def standing(self) -> Answer:
@@ -181,7 +181,7 @@ class GovernedMachine(Governed):
         return ""
 
     def journal(self) -> tuple[int, Sequence[TimedAction]]:
-        """How many deeds are forgotten, and those behind them."""
+        """How many actions are forgotten, and those behind them."""
         return self.cell.journal.forgotten, list(self.cell.journal)
 
     def standing(self) -> Answer:

@@ -243,7 +243,7 @@ def faults(history: History) -> dict[int, str]:
     """The faults that stand, in words."""
     cell, found = history.cell, {}
     for number, fault in cell.faults.standing.items():
-        asked = breaking.told(cell, fault)
+        asked = breaking.arguments_of(cell, fault)
         kind, where = str(asked.pop("kind")), asked.pop("where")
         more = ", ".join(
             f"{name} {value}" for name, value in asked.items() if value not in (None, 0, "both") or name == "level"

@@ -43,7 +43,7 @@ class Marks:
             case StoreImage():
                 self.put(entry.at, "stored", f"{len(entry.image)} bytes kept", unit)
 
-    def deed(self, cell: Cell, action: Action) -> None:
+    def action(self, cell: Cell, action: Action) -> None:
         """What was done to `cell`, now, if it does not show itself as a character or a supply does."""
         unit, text = _told(cell, action)
         if text:
@@ -81,7 +81,7 @@ def _told(cell: Cell, action: Action) -> tuple[str, str]:
         case Discard(line):
             return "", f"what waited on line {cell.wiring.line_names[line]} is dropped"
         case Break(fault, _):
-            broken = breaking.told(cell, fault)
+            broken = breaking.arguments_of(cell, fault)
             return "", f"{broken['kind']} at {broken['where']}"
         case Mend(number):
             return "", f"fault {number} mended"

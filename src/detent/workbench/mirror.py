@@ -30,7 +30,7 @@ MOST_ACTIONS: Final = 200_000  # with more, they cannot be done again
 SLACK: Final = 4  # what is no longer needed is forgotten when it is so many-th of everything
 
 STILL = Train(())  # of an axis that was found elsewhere, without a pulse
-Told: TypeAlias = MotionStarted | MotionCut | MotionEnded | Displaced
+MotionEntry: TypeAlias = MotionStarted | MotionCut | MotionEnded | Displaced
 
 
 class Axis:
@@ -41,10 +41,10 @@ class Axis:
         self.pulses = 0  # given before the first motion
         self.spans: list[Span] = []  # that are over
         self.motion: MotionStarted | None = None  # under way
-        self._told: list[tuple[int, Told]] = []
+        self._told: list[tuple[int, MotionEntry]] = []
         self._counts = [0]  # pulses of the first so many spans
 
-    def take(self, batch: int, entry: Told) -> None:
+    def take(self, batch: int, entry: MotionEntry) -> None:
         """The axis does this."""
         self._told.append((batch, entry))
         if isinstance(entry, MotionStarted):
@@ -97,7 +97,7 @@ class Axis:
                 self.initial, self.pulses = self.before(self.spans[-1].ends + 1)
             self._again(kept)
 
-    def _again(self, told: list[tuple[int, Told]]) -> None:
+    def _again(self, told: list[tuple[int, MotionEntry]]) -> None:
         self.spans, self.motion, self._told, self._counts = [], None, [], [0]
         for batch, entry in told:
             self.take(batch, entry)

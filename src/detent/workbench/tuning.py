@@ -17,9 +17,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from detent.motors.variants import SPREAD
 from detent.moves.law import clipped
 from detent.tuner.judge import judge_of
+from detent.tuner.report import option_lines
 from detent.tuner.spaces import Point
 from detent.tuner.task import Task, moves_of
-from detent.tuner.told import option_lines
 from detent.workbench import rigs
 from detent.workbench.answers import PickedSettings
 from detent.workbench.live import Live

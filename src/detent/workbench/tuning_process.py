@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 from detent.motors import gpu
 from detent.tuner.map import loss_map
+from detent.tuner.report import facts, fails_words, models_words, option_lines
 from detent.tuner.search import Progress
 from detent.tuner.spaces import Point
 from detent.tuner.task import Task
-from detent.tuner.told import facts, fails_words, models_words, option_lines
 from detent.tuner.tune import tune
 from detent.workbench.pipe import HEAD
 

@@ -68,12 +68,12 @@ class Phrases:
         if not question or not text.startswith(question):
             return Phrase((Piece(len(text), "answer", "what it printed"),), text.strip())
         answer = text[len(question) :]
-        note = told(question[asked[-1:] == bytes((LF,)) :].lstrip(), answer.strip())
+        note = meaning_of(question[asked[-1:] == bytes((LF,)) :].lstrip(), answer.strip())
         pieces = Piece(len(question), "echo", "echo of what was typed"), Piece(len(answer), "answer", note)
         return Phrase(tuple(piece for piece in pieces if piece.length), note)
 
 
-def told(question: str, answer: str) -> str:
+def meaning_of(question: str, answer: str) -> str:
     """What `answer` says to the line `question`, in words."""
     if not answer:
         return "done"

@@ -140,7 +140,7 @@ class SmcLanguage:
         off = value == commands.BRANCH or (instruction.op is Op.TRIP and value == 0)
         return None if off else value
 
-    def aimed(self, instruction: Instruction, address: int) -> Instruction:
+    def with_target(self, instruction: Instruction, address: int) -> Instruction:
         """The same instruction, leading to `address`."""
         place = self._place(instruction)
         assert place is not None

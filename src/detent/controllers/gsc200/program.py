@@ -255,7 +255,7 @@ class SimpleLanguage:
         argument = commands.row(self.model, instruction.op).argument
         return instruction.value if argument.address else None
 
-    def aimed(self, instruction: Instruction, address: int) -> Instruction:
+    def with_target(self, instruction: Instruction, address: int) -> Instruction:
         """The same jump, to `address`."""
         return instruction._replace(value=address)
 

@@ -3,7 +3,7 @@
 from detent.hosts.axis import Limits, Speeds
 from detent.hosts.dcb274.handshake import RESET
 from detent.hosts.dcb274.memory import Memory
-from detent.hosts.dcb274.ranges import CEILING, FARTHEST, SLOWEST, ramp_seconds, told
+from detent.hosts.dcb274.ranges import CEILING, FARTHEST, SLOWEST, commanded_rate, ramp_seconds
 from detent.hosts.dcb274.unit import REST
 from detent.hosts.errors import MotionFailed
 from detent.hosts.exchange import Asynchronous, Blocking, Steps, operation
@@ -38,7 +38,7 @@ class Dcb274(Memory):
     def run_at(self, rate: float) -> Steps[None]:
         """Ramp to `rate` and go on (M)."""
         divide = yield from self._divisor()
-        yield from self.velocity(told(rate * divide))
+        yield from self.velocity(commanded_rate(rate * divide))
 
     @operation
     def halt(self) -> Steps[None]:
@@ -94,8 +94,8 @@ class Dcb274(Memory):
         slope = max(_slope(speeds, divisor), 1 if seconds else 0)
         if divisor != old:
             yield from self.divide(divisor)
-        yield from self.initial_velocity(told(start * divisor))
-        yield from self.slew_velocity(told(slew * divisor))
+        yield from self.initial_velocity(commanded_rate(start * divisor))
+        yield from self.slew_velocity(commanded_rate(slew * divisor))
         yield from self.ramp_slope(slope, slope)
         if self.mode == "single":
             settings = yield from self.examine()

@@ -45,7 +45,7 @@ def speed(rate: float, *, signed: bool = False) -> int:
     return whole
 
 
-def told(rate: float) -> float:
+def commanded_rate(rate: float) -> float:
     """The rate that the unit is told so that it makes `rate`: up to its ceiling that is 36 000 steps/s at most."""
     return max(-FASTEST, min(rate, FASTEST)) if abs(rate) <= CEILING else rate
 
