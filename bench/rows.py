@@ -42,6 +42,19 @@ def least(fn: Callable[[], object], repeat: int = 5) -> float:
     return min(times)
 
 
+def alternately(*fns: Callable[[], object], repeat: int = 5) -> list[float]:
+    """As `least`, for each of `fns`: in turns, so that all of them meet the same machine."""
+    for fn in fns:
+        fn()
+    times: list[list[float]] = [[] for _ in fns]
+    for _ in range(repeat):
+        for fn, taken in zip(fns, times, strict=True):
+            begin = process_time()
+            fn()
+            taken.append(process_time() - begin)
+    return [min(taken) for taken in times]
+
+
 def print_table(rows: Sequence[Row]) -> None:
     """Print the rows, aligned, each with its ratio to the baseline and its target."""
     print(f"{'':48} {'value':>12} {'unit':10} {'ratio':>8}  {'baseline':36} {'target':>9}")

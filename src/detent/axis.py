@@ -12,7 +12,7 @@ from enum import Enum
 from typing import NamedTuple, Protocol, TypeAlias
 
 from detent.pulses import Train
-from detent.ticks import NEVER, Ns, to_fixed
+from detent.ticks import NEVER, Ns, instants, to_fixed
 
 Marks: TypeAlias = tuple[int, ...]
 
@@ -74,8 +74,36 @@ class Moment(Enum):
     HELD = "held"  # a pulse fell due while the gate was shut, and waits
 
 
+class Leeway:
+    """How far a position could be elsewhere without making a difference to what its controller did, since `anew`.
+
+    Up to `back` steps below, or `forth` above, every question about it would have been answered as it was.
+    """
+
+    __slots__ = ("back", "forth")
+
+    def __init__(self) -> None:
+        self.anew()
+
+    def anew(self) -> None:
+        """Nobody has asked."""
+        self.back = self.forth = NEVER
+
+    def exactly(self) -> None:
+        """Somebody has asked where it is."""
+        self.back = self.forth = 0
+
+    def within(self, position: int, low: int, high: int) -> None:
+        """Somebody has asked whether `position`, which it is, lies within a range."""
+        self.back, self.forth = min(self.back, position - low), min(self.forth, high - position)
+
+
 class Axis:
     """The motion of one motor. `deadline` says when to call `advance`; it is `NEVER` at rest."""
+
+    INSTANTS = instants(deadline=0, train=NEVER)
+    PLACES = ("shaft",)
+    COUNTS = ("pulses",)
 
     __slots__ = ("_due", "_held", "_marks", "_open", "_out", "deadline", "direction", "every_pulse",
                  "name", "pulses", "shaft", "train")  # fmt: skip

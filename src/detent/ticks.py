@@ -10,7 +10,9 @@ A time becomes a nanosecond once, by :func:`round_fixed`, half up.
 """
 
 import re
+from collections.abc import Mapping
 from fractions import Fraction
+from types import MappingProxyType
 from typing import TypeAlias
 
 Ns: TypeAlias = int
@@ -29,6 +31,14 @@ _YEAR = 31_557_600  # s
 NEVER: Ns = 1 << 100  # a deadline that does not come: later than any time that can be asked for
 LONGEST_YEARS = 1_000_000
 LONGEST: Ns = LONGEST_YEARS * _YEAR * SECOND  # of durations that can be asked for: many times that is before NEVER
+
+
+def instants(**memory: Ns | str) -> Mapping[str, Ns | str]:
+    """What a class remembers by the clock: the names of these attributes, and for how long each may still matter.
+
+    0: until it is over; a time: so much longer; the name of another: as long as that one; `NEVER`: for ever.
+    """
+    return MappingProxyType(memory)
 
 
 def to_fixed(ns: Ns) -> Fixed:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple, Protocol, TypeAlias
 
-from detent.ticks import NEVER, SECOND, Ns, round_ratio
+from detent.ticks import NEVER, SECOND, Ns, instants, round_ratio
 
 
 class Char(NamedTuple):
@@ -187,10 +187,11 @@ class Transmitter:
     """
 
     __slots__ = ("_baud", "_bits", "_burst", "_index", "_out", "_port", "_queue", "_timed", "busy_until", "deadline")
+    INSTANTS = instants(_burst="busy_until", busy_until=0, deadline=0)
 
     def __init__(self, port: str, form: Format, out: Outbox, *, timed: bool = True) -> None:
         self._port, self._out, self._timed = port, out, timed
-        self._bits, self._baud = form.bits * SECOND, form.baud  # of `Format.duration`
+        self._bits, self._baud = form.bits, form.baud
         self._queue: deque[Char] = deque()
         self._burst: Ns = 0  # start of the run of characters sent without a pause
         self._index = 0  # of the next character in the burst
@@ -225,7 +226,7 @@ class Transmitter:
         if self._queue:
             raise RuntimeError("characters are waiting to be sent: discard them before the format changes")
         self._burst, self._index = self.busy_until, 0
-        self._bits, self._baud = form.bits * SECOND, form.baud
+        self._bits, self._baud = form.bits, form.baud
 
     def advance(self, now: Ns) -> None:
         """Begin the characters that are due up to and including `now`."""
@@ -238,4 +239,4 @@ class Transmitter:
 
     def _end(self, characters: int) -> Ns:
         """When so many characters of the burst have been sent: as `Format.duration` has it, rounded once."""
-        return self._burst + round_ratio(characters * self._bits, self._baud)
+        return self._burst + round_ratio(characters * self._bits * SECOND, self._baud)

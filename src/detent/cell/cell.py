@@ -29,6 +29,7 @@ from detent.cell.actions import (
 from detent.cell.breakage import Breakage
 from detent.cell.circuit import Circuit
 from detent.cell.copying import duplicate
+from detent.cell.cycles import Cycles
 from detent.cell.faults import Fault
 from detent.cell.outside import Outside, Store, Typed, no_store, nobody_asks
 from detent.cell.recording import Log, Recording
@@ -103,18 +104,39 @@ class Cell:
         if until > self.latest:
             raise ValueError(f"this cell runs to {show_duration(self.latest)} at most, and not to {until} ns")
         instants, look, most = 0, idling.FIRST, idling.LEAST
-        while (at := self._next()) <= until:
-            self._advance(at)
-            instants += 1
-            if instants == look:
-                instants, (look, most) = 0, self._look_for_loops(until, most)
+        cycles: Cycles | None = None  # looked for when some instants have been run through
+        longest, before = NEVER, self.now
+        try:
+            while (at := self._next()) <= until:
+                if at - before >= longest:
+                    assert cycles is not None
+                    passed = cycles.meet(at - before, until + 1, self._script_deadline)
+                    longest = cycles.longest
+                    if passed:
+                        before = self.now
+                        continue
+                self._advance(at)
+                before = at
+                instants += 1
+                if instants == look:
+                    if cycles is None:
+                        cycles = Cycles(self.circuit)
+                    cycles.passed(instants)
+                    instants, (look, most) = 0, self._look_for_loops(until, most, cycles)
+                    longest = cycles.longest
+        finally:
+            if cycles is not None:
+                cycles.close()
         self.circuit.now = max(self.now, until)
 
-    def _look_for_loops(self, until: Ns, most: int) -> tuple[int, int]:
+    def _look_for_loops(self, until: Ns, most: int, cycles: Cycles) -> tuple[int, int]:
         """Pass over programs that turn in loops of at most `most` instants; when to look again, and for which."""
         circuit = self.circuit
         stirred, circuit.stirred = circuit.stirred, False
-        if stirred or idling.pass_over(circuit, min(until, self._script_deadline), most):
+        if stirred:
+            return idling.FIRST, idling.LEAST
+        cycles.again()  # nothing stirs: what there is to be passed over are programs in loops
+        if idling.pass_over(circuit, min(until, self._script_deadline), most):
             return idling.FIRST, idling.LEAST
         most = min(2 * most, idling.MOST)
         return most * idling.PATIENCE, most

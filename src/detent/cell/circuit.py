@@ -75,6 +75,11 @@ class Circuit:
 
     # -- time --------------------------------------------------------------------------------------------
 
+    @property
+    def inside(self) -> Sequence[object]:
+        """What it keeps for itself, but for what happens within an instant."""
+        return self._built, self._supplied, self._strange, self._driving
+
     def next(self) -> Ns:
         """When something happens next by itself; NEVER: nothing is left to do."""
         at, line = min(self.deadlines), self.line_deadline

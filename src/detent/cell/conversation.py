@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
-from detent.cell.recording import Entry, Recording
-from detent.cell.turns import Turns
+from detent.cell.recording import Entry, Recording, Repeated
 from detent.controllers import catalogue
 from detent.controllers.device import Cautioned, Controller, Refused
 from detent.ticks import Ns
@@ -61,8 +60,8 @@ class Observer(Recording):
             elif kind is Cautioned:
                 self._conversation.note_caution(unit, entry)  # type: ignore[arg-type]
 
-    def turn(self, turns: Turns[Entry]) -> None:
-        """Programs turned in loops: nothing moved, and nothing was refused."""
+    def turn(self, turns: Repeated) -> None:
+        """Programs turned in loops, or the cell in rounds: nothing moves that did not before, nothing was refused."""
         if self._keeps:
             super().turn(turns)
 

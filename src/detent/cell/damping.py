@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from detent.controllers.device import Output, Powered
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind
-from detent.ticks import MS, US, Ns
+from detent.ticks import MS, US, Ns, instants
 from detent.uart import Char
 
 PULSE: Ns = 2 * US
@@ -28,6 +28,7 @@ PINS = (
 class PhaseReversal:
     """Steps the motor back and forward once, a set time after the last pulse of each motion."""
 
+    INSTANTS = instants()  # none while it rests
     pins: Sequence[Pin] = PINS
 
     def __init__(self, brake: Ns = 2 * MS, release: Ns = 3 * MS) -> None:

@@ -9,6 +9,7 @@ from itertools import islice
 from typing import Generic, NamedTuple, Self, TypeAlias, TypeVar
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.cell.rounds import Rounds
 from detent.cell.turns import Turns
 from detent.controllers.device import Output
 from detent.pins import Level
@@ -40,6 +41,9 @@ T = TypeVar("T")
 
 Batch: TypeAlias = tuple[int, Sequence[Entry]]
 """A unit, by its number, and what it did in one go."""
+
+Repeated: TypeAlias = Turns[Entry] | Rounds[Entry]
+"""What programs in loops did turn after turn, or the whole cell round after round."""
 
 
 class Span(NamedTuple):
@@ -113,11 +117,11 @@ class Recording:
 
     def __init__(self, units: Sequence[str]) -> None:
         self.units = tuple(units)
-        self._batches: Log[Batch | Turns[Entry]] = Log()
+        self._batches: Log[Batch | Repeated] = Log()
 
     def __len__(self) -> int:
         """How many entries there are."""
-        return sum(item.count if isinstance(item, Turns) else len(item[1]) for item in self._batches)
+        return sum(len(item[1]) if isinstance(item, tuple) else item.count for item in self._batches)
 
     def __iter__(self) -> Iterator[tuple[int, Entry]]:
         """All entries, in the order in which they happened."""
@@ -129,40 +133,49 @@ class Recording:
         Whoever says what is wanted does not go through a year of a program that does nothing of it.
         """
         for item in self._batches:
-            if isinstance(item, Turns):
-                if not kinds or not item.kinds.isdisjoint(kinds):
-                    yield from item
-            else:
+            if isinstance(item, tuple):
                 unit, entries = item
                 for entry in entries:
                     yield unit, entry
+            elif not kinds or not item.kinds.isdisjoint(kinds):
+                yield from item.with_kinds(kinds) if kinds and isinstance(item, Rounds) else item
 
-    def pieces(self) -> Iterator[Batch | Turns[Entry]]:
-        """What it is made of, in order: batches, and programs in loops as one turn of each."""
+    def pieces(self) -> Iterator["Batch | Repeated"]:
+        """What it is made of, in order: batches, programs in loops as one turn of each, the cell as one round."""
         return iter(self._batches)
 
     def extend(self, unit: int, entries: Sequence[Entry]) -> None:
         """Add what one unit did."""
         self._batches.append((unit, entries))
 
-    def turn(self, turns: Turns[Entry]) -> None:
-        """Add what units did whose programs turned in loops: instructions and levels of outputs, nothing else."""
+    def turn(self, turns: "Repeated") -> None:
+        """Add what units did whose programs turned in loops: instructions and levels of outputs, nothing else.
+
+        Or what the whole cell did, round after round.
+        """
         self._batches.append(turns)
 
     def take(self) -> list[Batch]:
         """The batches since the last call. For somebody who keeps them elsewhere."""
         taken: list[Batch] = []
         for item in self._batches.take():
-            if isinstance(item, Turns):
-                taken += [(unit, (entry,)) for unit, entry in item]
-            else:
+            if isinstance(item, tuple):
                 taken.append(item)
+            else:
+                taken += [(unit, (entry,)) for unit, entry in item]
         return taken
 
     def of(self, unit: str, *kinds: type[Entry]) -> list[Entry]:
         """The entries of one unit, in order; as in `with_kinds`."""
         index = self.units.index(unit)
-        return [entry for i, entry in self.with_kinds(*kinds) if i == index]
+        found: list[Entry] = []
+        for item in self._batches:
+            if isinstance(item, tuple):
+                if item[0] == index:
+                    found += item[1]
+            elif not kinds or not item.kinds.isdisjoint(kinds):
+                found += item.of(index, kinds) if isinstance(item, Rounds) else item.of(index)
+        return found
 
     def motion(self, unit: str, until: Ns, axis: str = "") -> list[Span]:
         """The pulses of one axis of a unit up to `until`, in order and without gaps or overlaps."""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.controllers.device import DriveSet, Output, Powered, StageSet
 from detent.pins import HIGH, LOW, Level, Pin, PinKind, PinSet
-from detent.ticks import NEVER, Ns
+from detent.ticks import NEVER, Ns, instants
 from detent.uart import Char
 
 CONTACT = "OUT"
@@ -18,6 +18,7 @@ CONTACT = "OUT"
 class Switch:
     """A contact that somebody sets (`set_pin("SET", level)`): a panel switch, a level from outside."""
 
+    INSTANTS = instants(deadline=0)
     pins: Sequence[Pin] = (Pin(CONTACT, None, PinKind.OUTPUT, "the contact"),)
 
     def __init__(self, level: Level) -> None:

@@ -53,6 +53,11 @@ class Turns(Generic[T]):
             found += rounds * len(turn.entries) + begun
         return found
 
+    @property
+    def units(self) -> list[int]:
+        """The units."""
+        return [turn.unit for turn in self.turns]
+
     def __iter__(self) -> Iterator[tuple[int, T]]:
         """All entries with their units, made as they are asked for."""
         if len(self.turns) == 1:

@@ -10,6 +10,11 @@ come before pins, pins before characters. `receive` and `set_pin` therefore firs
 
 A device can be copied at any moment (`copy.deepcopy`) and both copies go on identically. What never
 changes (tables, trains, options) returns itself when copied.
+
+What a device remembers by the clock it names in `INSTANTS`, what counts from a place in `PLACES` (`detent.cell.later`):
+then a cell that does the same again and again can be put on by whole rounds. What depends on the time in another way
+(a clock of its own that ticks) names nothing: a cell with it is run through. `leeway`, if it has it, tells how far its
+axis could be elsewhere without a difference.
 """
 
 from collections.abc import Mapping, Sequence

@@ -202,6 +202,7 @@ class FaultyLine(Line):
     """
 
     __slots__ = ("_chained", "_late", "_late_heard", "_standing", "host_place", "hosted", "line", "strikes", "strobe")
+    PAST = ("strikes",)
 
     def __init__(self, line: Line, host_place: int | None = None) -> None:
         self.line, self.host_place = line, host_place

@@ -8,7 +8,7 @@ on which a 0 wins: characters of two units that coincide in time merge bit by bi
 from typing import NamedTuple
 
 from detent.pins import Level
-from detent.ticks import NEVER, Ns
+from detent.ticks import NEVER, Ns, instants
 from detent.uart import Char, Chars, Format, Sent, Transmitter, characters
 
 HOST_PORT = "HOST"
@@ -56,6 +56,8 @@ class Line:
         "heard",
     )
 
+    INSTANTS = instants(deadline=0)
+    PAST = ("heard",)
     hosted: bool = False  # whether its host is a unit of the cell
     strobe: str = ""  # the input of every unit that the line drives, if it has such a wire
     parting: Chars = b""  # what its units hear when the host's program leaves, where that means something to them

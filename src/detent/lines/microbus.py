@@ -12,7 +12,7 @@ from collections import deque
 
 from detent.lines.line import Arrival, Line
 from detent.pins import HIGH, LOW, Level
-from detent.ticks import Ns
+from detent.ticks import Ns, instants
 from detent.uart import Char, Chars, Format
 
 LET_GO = Char(0, framing_ok=False)  # the CCU lets go of the bus: no byte, and no strobe
@@ -23,6 +23,7 @@ class Microbus(Line):
 
     __slots__ = ("_edges", "_strobed")
 
+    INSTANTS = instants(_strobed=0)
     strobe: str = "T0"
     parting: Chars = (LET_GO,)
 

@@ -10,7 +10,7 @@ from enum import Enum
 from typing import Any, Final
 
 from detent.pins import HIGH, LOW, Level, Pin, PinDriver, PinKind
-from detent.ticks import MS, NEVER, Ns
+from detent.ticks import MS, NEVER, Ns, instants
 from detent.uart import Char, Format, SerialPort, Transmitter
 
 LF, CR, ESC, SPACE = 0x0A, 0x0D, 0x1B, 0x20
@@ -38,6 +38,7 @@ DOWNSTREAM = SerialPort("RX", "TX")
 class Adapter:
     """What both adapters are: a converter between two lines, and the driver of PARTY."""
 
+    INSTANTS = instants()
     pins: Sequence[Pin] = PINS
     serial_port = UPSTREAM
     downstream = DOWNSTREAM
@@ -161,6 +162,8 @@ class Sin10(Adapter):
     SPACE makes it a plain converter, and signs one axis on; a character before that is its name (page 23). So it
     stays until `&`, ^C or power-off: "selectable via host commands or a built in mode switch" (page 20).
     """
+
+    INSTANTS = instants(_timer=0, _begin_at=0)
 
     def __init__(
         self, baud: int = 9600, line_baud: int = 9600, party: bool = False, converter: bool = False, *,

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from detent.cell.recording import Entry, Recording, Span
-from detent.cell.turns import Turns
+from detent.cell.rounds import Rounds
 from detent.controllers.device import Executing, Finished, Powered
 from detent.outputs.axis_motion import Pulses
 from detent.outputs.signals import Signals, UnitSignals
@@ -153,10 +153,10 @@ def instructions(signals: Signals, name: str) -> list[Band]:
 def _executed(recording: Recording, unit: int) -> Iterator[Entry | Band]:
     """The entries of a unit; a band for many turns of a loop."""
     for piece in recording.pieces():
-        if not isinstance(piece, Turns):
+        if isinstance(piece, tuple):
             if piece[0] == unit:
                 yield from piece[1]
-        elif piece.count < MANY_TURNS:
+        elif isinstance(piece, Rounds) or piece.count < MANY_TURNS:
             yield from piece.of(unit)
         else:
             yield from (Band(turn.begins, piece.ends, "") for turn in piece.turns if turn.unit == unit)

@@ -13,7 +13,6 @@ import numpy.typing as npt
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
 from detent.cell.recording import InputSet, Received, Recording
-from detent.cell.turns import Turns
 from detent.controllers.device import Powered
 from detent.outputs.axis_motion import AxisMotion, Pulses
 from detent.outputs.units import UnitLog, UnitView, views
@@ -212,8 +211,8 @@ class UnitSignals:
 def _check_loops(recording: Recording) -> None:
     """ValueError if programs in loops switch outputs more often than can be held."""
     for piece in recording.pieces():
-        if isinstance(piece, Turns) and PinSet in piece.kinds and piece.count > MOST_CHANGES:
-            names = ", ".join(recording.units[turn.unit] for turn in piece.turns)
+        if not isinstance(piece, tuple) and PinSet in piece.kinds and piece.count > MOST_CHANGES:
+            names = ", ".join(recording.units[unit] for unit in piece.units)
             raise ValueError(
                 f"there are {piece.count} instructions and changes of outputs by programs in loops ({names}), and "
                 f"{MOST_CHANGES} can be written: run for less"

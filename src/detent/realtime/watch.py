@@ -10,8 +10,7 @@ from typing import Final, TypeVar
 
 from detent.cell.cell import Cell
 from detent.cell.panel import Front, Panel
-from detent.cell.recording import Entry, Log, Received, Recording
-from detent.cell.turns import Turns
+from detent.cell.recording import Entry, Log, Received, Recording, Repeated
 from detent.controllers.device import Cautioned, Executing, Powered, Refused, StoreImage
 from detent.uart import Sent
 
@@ -77,8 +76,8 @@ class Watch(Recording):
             if watched.tell(entry):
                 self.events.append((unit, entry))  # type: ignore[arg-type]  # those are the ones worth keeping
 
-    def turn(self, turns: Turns[Entry]) -> None:
-        """Programs turned in loops: the last turn of each shows where it is."""
+    def turn(self, turns: Repeated) -> None:
+        """Programs turned in loops, or the cell in rounds: the last of them shows how things are."""
         if self._passes_on:
             super().turn(turns)
         for unit, entry in turns.last():

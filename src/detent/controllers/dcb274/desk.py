@@ -16,7 +16,7 @@ from detent.controllers.dcb274.program import END, SHADOW, allowed, encode
 from detent.controllers.dcb274.running import Running
 from detent.controllers.dcb274.work import Work
 from detent.controllers.device import Output, Refused, StoreImage
-from detent.ticks import MS, NEVER, Ns
+from detent.ticks import MS, NEVER, Ns, instants
 
 VERSION: Final = "V1.10"
 PAGE_OF_LISTING: Final = 20  # instructions (page 48)
@@ -64,6 +64,8 @@ class Speaker(Protocol):
 
 class Desk:
     """The command in hand of one unit. `timer` says when to call `advance`; call `poll` after everything else."""
+
+    INSTANTS = instants(timer=0)
 
     def __init__(self, work: Work, running: Running, speaker: Speaker, out: list[Output]) -> None:
         self._work, self._running, self._speaker, self._out = work, running, speaker, out

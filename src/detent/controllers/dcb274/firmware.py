@@ -8,6 +8,7 @@ whatever the idle state tests is tested (jog, go: page 27).
 from collections import deque
 from collections.abc import Mapping, Sequence
 
+from detent.axis import Leeway
 from detent.controllers.dcb274 import current, pins, program, settings
 from detent.controllers.dcb274.commands import MODEL
 from detent.controllers.dcb274.contacts import Contacts
@@ -37,7 +38,7 @@ from detent.controllers.dcb274.work import Work, position
 from detent.controllers.device import StageSet, Status, Stop, StoreImage
 from detent.controllers.powered import OneAxis
 from detent.pins import HIGH, LOW, Level, Pin, PulseOutput
-from detent.ticks import NEVER, Ns
+from detent.ticks import NEVER, Ns, instants
 from detent.uart import Char, Format, SerialPort
 
 SIGN_ON = f"    110 AMS SMC-27X2 {VERSION}\r\n"  # behind the echoed space
@@ -48,6 +49,7 @@ class Dcb274(OneAxis):
     """One DCB-274. Straps that are not named are `pins.DEFAULT_STRAPS`."""
 
     model = MODEL
+    INSTANTS = instants(_readout_at=0)
 
     def __init__(
         self,
@@ -347,6 +349,11 @@ class Dcb274(OneAxis):
         over = max(self._motion.rested_at + SETTLING, self._transmitter.busy_until) <= now
         others = min(self._motion.deadline, self._desk.timer, self._transmitter.deadline, self._readout_at)
         return over and others >= NEVER and self._motion.at_rest and self._running.timer < NEVER
+
+    @property
+    def leeway(self) -> Leeway:
+        """Of its position counter."""
+        return self._motion.leeway
 
     def postpone(self, by: Ns) -> None:
         """The program goes on so much later."""

@@ -7,7 +7,7 @@ already sent. `advance` tells when a motion has ended and when a step has reache
 from enum import Enum
 from typing import NamedTuple
 
-from detent.axis import Axis
+from detent.axis import Axis, Leeway
 from detent.controllers.dcb274 import settings
 from detent.controllers.dcb274.pins import DIRECTION_HELD, LEAST_STEP_LOW, LEAST_STEP_PERIOD
 from detent.controllers.dcb274.ports import Ports
@@ -16,7 +16,7 @@ from detent.controllers.device import Stop
 from detent.pins import HIGH, LOW
 from detent.pulses import Train, Uniform
 from detent.ramps import timer_table
-from detent.ticks import MS, NEVER, SECOND, Ns, to_fixed
+from detent.ticks import MS, NEVER, SECOND, Ns, instants, to_fixed
 
 SETTLING: Ns = SECOND  # from the end of a motion to the hold current (page 52)
 COUNTS = 1 << 24  # of the position counter
@@ -60,8 +60,15 @@ def wrapped(position: int) -> int:
 class Motion:
     """The motion of one axis. `deadline` says when to call `advance`."""
 
+    INSTANTS = instants(
+        rested_at=4 * SECOND,  # three of the longest periods between external steps, and more than `SETTLING`
+        _energized_at=0, _sets_off=0, _step_due=0, _step_fell=LEAST_STEP_LOW, _stepped=NEVER,
+    )  # fmt: skip
+    PLACES = ("_origin",)
+
     def __init__(self, axis: Axis, ports: Ports, registers: Settings, *, encoder: bool) -> None:
         self._axis, self._ports, self._settings, self._encoder = axis, ports, registers, encoder
+        self.leeway = Leeway()  # of the position counter
         self.reset()
 
     def reset(self) -> None:
@@ -125,6 +132,7 @@ class Motion:
 
     def position(self, now: Ns) -> int:
         """The position counter."""
+        self.leeway.exactly()
         return wrapped(self._axis.shaft_at(now) - self._origin)
 
     def period(self, now: Ns) -> int:

@@ -10,7 +10,7 @@ from detent.controllers.dcb274 import settings
 from detent.controllers.dcb274.pins import DIRECTION_HOLD, INPUTS, STEP_LOW
 from detent.controllers.dcb274.settings import Settings
 from detent.pins import HIGH, LOW, Level, PinDriver
-from detent.ticks import NEVER, Ns
+from detent.ticks import NEVER, Ns, instants
 
 P4, P5 = 8, 16  # flags of A
 READ_PORTS: Final = 129  # to A: do not set anything, print the ports
@@ -21,6 +21,8 @@ JOGS: Final = ((128, "JOG-S"), (64, "JOG2"), (32, "JOG1"))  # those of ] 1
 
 class Ports:
     """The pins of J1 and J4. `deadline` is when a step pulse ends, or the direction output changes."""
+
+    INSTANTS = instants(_last_pulse=STEP_LOW + DIRECTION_HOLD, _rises=0, _turns=0)
 
     def __init__(self, driver: PinDriver, registers: Settings, p4_input: bool) -> None:
         self.levels: dict[str, Level] = dict.fromkeys(INPUTS, HIGH)

@@ -4,15 +4,15 @@ Every wait is a `Stage` with its deadline, or with a condition that `poll` looks
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple
 
 from detent.controllers.dcb274 import commands
 from detent.controllers.dcb274.commands import BRANCH, ROWS, Instruction, Op
 from detent.controllers.dcb274.program import BRANCHES
 from detent.controllers.dcb274.work import Work
 from detent.controllers.device import Executing, Output
-from detent.ticks import MS, NEVER, Ns
+from detent.ticks import MS, NEVER, Ns, instants
 
 
 class Stage(Enum):
@@ -32,9 +32,11 @@ class Stage(Enum):
 _WAITS = (Stage.HELD, Stage.MOTION, Stage.WAIT, Stage.PORT, Stage.LAST)
 
 
-class _Saved(NamedTuple):
+@dataclass(slots=True)
+class _Saved:
     """Where the program was when it called the trip routine."""
 
+    INSTANTS = instants(timer=0)
     stage: Stage
     address: int
     instruction: Instruction | None
@@ -46,6 +48,8 @@ class Running:
 
     `say` prints a line of output, and returns when the line is free again.
     """
+
+    INSTANTS = instants(timer=0)
 
     def __init__(self, work: Work, out: list[Output], say: Callable[[str, Ns], Ns]) -> None:
         self._work, self._out, self._say = work, out, say
@@ -257,7 +261,8 @@ class Running:
         if saved is None:
             self._wait(Stage.LAST, now)
             return
-        self.stage, self.address, self._instruction, self.timer = saved
+        self.stage, self.address = saved.stage, saved.address
+        self._instruction, self.timer = saved.instruction, saved.timer
         if self._serve(now):
             return
         if self.stage is Stage.FETCH:

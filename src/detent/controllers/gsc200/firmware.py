@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
+from detent.axis import Leeway
 from detent.controllers.device import Refused, Status, Stop, StoreImage
 from detent.controllers.gsc200 import commands, pins, program
 from detent.controllers.gsc200.commands import GS_C200S, CommandError, Instruction, Op
@@ -18,7 +19,7 @@ from detent.controllers.gsc200.program import Program, ProgramFull
 from detent.controllers.gsc200.running import Running
 from detent.controllers.powered import OneAxis
 from detent.pins import HIGH, LOW, Level, Pin, PinKind, PulseOutput
-from detent.ticks import MS, NEVER, Ns
+from detent.ticks import MS, NEVER, Ns, instants
 from detent.uart import Char, Format, SerialPort
 
 INSTRUCTION_TIME: Ns = 1 * MS  # our assumption: no loop takes no time, no output pulse has no width
@@ -27,6 +28,8 @@ FIRST_ORED_REVISION = (2, 2)  # of the GS-C200: from here on the checksum is ORe
 
 class GsC200(OneAxis):
     """One GS-C200 or GS-C200S module. Straps that are not named are `pins.DEFAULT_STRAPS`."""
+
+    INSTANTS = instants()
 
     def __init__(
         self,
@@ -217,6 +220,11 @@ class GsC200(OneAxis):
         """Neither a move nor an answer is under way."""
         only = self._transmitter.deadline >= NEVER and self._kept is None and self._transmitter.busy_until <= now
         return only and self._running.only_its_timer
+
+    @property
+    def leeway(self) -> Leeway:
+        """Of its position counter."""
+        return self._counter.leeway
 
     def postpone(self, by: Ns) -> None:
         """The next instruction is reached so much later."""

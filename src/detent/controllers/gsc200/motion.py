@@ -11,7 +11,7 @@ from detent.controllers.device import Stop
 from detent.controllers.gsc200.pins import RESET_LOW_NS
 from detent.pins import HIGH, LOW, Level, PinDriver, PulseOutput
 from detent.ramps.constant_acceleration import Move, move
-from detent.ticks import NEVER, Ns, to_fixed
+from detent.ticks import NEVER, Ns, instants, to_fixed
 
 STEPS_PER_SECOND = 10  # S and T count in tens ("a by 10 multiplier is used")
 
@@ -31,6 +31,7 @@ class Motion:
     __slots__ = ("_axis", "_clock", "_clock_rises", "_clocks_low", "_inputs", "_move", "_pins",
                  "_reset_rises", "course", "deadline",
                  "ramp", "slew", "start_stop")  # fmt: skip
+    INSTANTS = instants(_clock_rises=0, _reset_rises=0, deadline=0)
 
     def __init__(self, axis: Axis, pins: PinDriver, inputs: dict[str, Level], clock: PulseOutput) -> None:
         self._axis, self._pins, self._inputs, self._clock = axis, pins, inputs, clock

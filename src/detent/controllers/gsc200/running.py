@@ -14,7 +14,7 @@ from detent.controllers.gsc200.flow import Flow
 from detent.controllers.gsc200.motion import Course, Motion
 from detent.controllers.gsc200.program import Program, Step
 from detent.pins import HIGH, LOW, Level, PinDriver
-from detent.ticks import MS, NEVER, Ns
+from detent.ticks import MS, NEVER, Ns, instants
 
 TENTH_OF_A_SECOND: Ns = 100 * MS
 USER_INPUTS = ("", "UI1", "UI2", "UI3")
@@ -23,6 +23,8 @@ USER_OUTPUTS = ("", "UO1", "UO2", "UO3")
 
 class Running:
     """The busy side of one module. `deadline` says when to call `advance`."""
+
+    INSTANTS = instants(timer=0)
 
     def __init__(
         self,

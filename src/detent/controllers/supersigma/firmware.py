@@ -19,7 +19,7 @@ from detent.pins import HIGH, LOW, Level, Pin, PinKind, PulseOutput
 from detent.ramps.differences import PAPER, Differences
 from detent.ramps.rate_generator import CLOCK_HZ
 from detent.ramps.ways import Way
-from detent.ticks import Ns, show_duration
+from detent.ticks import Ns, instants, show_duration
 from detent.uart import Char, Format, Sent, SerialPort, Transmitter
 
 
@@ -27,6 +27,7 @@ class Supersigma(OneAxis, WithoutPrograms):
     """One SUPERSIGMA drive with the given number on the bus. It has no straps."""
 
     model = "supersigma"
+    INSTANTS = instants()
 
     def __init__(
         self,

@@ -9,7 +9,7 @@ go of the bus (our assumption; the paper's protocol "is given [1,3]").
 from typing import NamedTuple
 
 from detent.controllers.supersigma import commands
-from detent.ticks import MS, NEVER, Ns
+from detent.ticks import MS, NEVER, Ns, instants
 from detent.uart import Char
 
 ANSWER_LENGTH = 3
@@ -38,6 +38,7 @@ class Link:
     """Collects bytes into the messages for one drive, and makes its answers. `deadline`: when to call `drop`."""
 
     __slots__ = ("_bytes", "deadline", "number")
+    INSTANTS = instants(deadline=0)
 
     def __init__(self, number: int) -> None:
         self.number = number

@@ -10,7 +10,7 @@ from detent.pins import HIGH, LOW, Level, PinDriver
 from detent.ramps.differences import nearest_count
 from detent.ramps.rate_generator import CLOCK_NS
 from detent.ramps.table_movement import Movement, braked, constant
-from detent.ticks import NEVER, Ns, to_fixed
+from detent.ticks import NEVER, Ns, instants, to_fixed
 
 ENDLESS = 1 << 40  # steps of a search: 50 years at low speed
 
@@ -40,6 +40,7 @@ class Motion:
         "course",
         "deadline",
     )
+    INSTANTS = instants(_start="deadline", _step_rises=0, deadline=0)
 
     def __init__(self, axis: Axis, driver: PinDriver, inputs: dict[str, Level], program: Program) -> None:
         self._axis, self._pins, self._inputs, self._program = axis, driver, inputs, program
