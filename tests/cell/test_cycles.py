@@ -107,16 +107,31 @@ def test_what_the_script_does_ends_it_to_the_instant() -> None:
         assert rounds(run) > 20
 
 
-def test_what_the_script_does_again_and_again_is_part_of_no_round() -> None:
-    """A hand that shuts and opens what it opened and shut leaves the cell as it was, and is still no part of it."""
-    script = ""
-    for bar in range(8, 60):
+def test_what_the_script_does_is_part_of_no_round() -> None:
+    """A hand that opens what it has shut leaves the cell as it was; it does so once, in whichever bar, and no more."""
+    for bar in range(1, 8):
+        script = ""
         for late, level in ((0.7, 0), (0.8, 1)):
-            script += f"[[script]]\nat = {3.3918435495 * bar + late:.9f}\nset = {{ stop = {level} }}\n"
-    stepped, run = drilling(script), drilling(script)
-    step_to(stepped, 200 * SECOND)
-    run.run_to(200 * SECOND)
-    check_alike(run, stepped)
+            script += f"[[script]]\nat = {3.39184355 * bar + late:.9f}\nset = {{ stop = {level} }}\n"
+        stepped, run = drilling(script), drilling(script)
+        step_to(stepped, 70 * SECOND)
+        run.run_to(70 * SECOND)
+        check_alike(run, stepped)
+        assert rounds(run) > 3
+
+
+@pytest.mark.parametrize("outside", [False, True])
+def test_a_time_in_which_something_came_from_outside_is_no_round(outside: bool) -> None:
+    cell, bar = drilling(), 3_391_843_550
+    search = cycles.Cycles(cell.circuit)
+    search.passed(cycles.FIRST)
+    met = []
+    for number in range(3):
+        step_to(cell, 10 * SECOND + number * bar)
+        met.append(search.meet(0, 1000 * SECOND, NEVER - (outside and number == 2)))  # the script goes on
+    search.close()
+    assert met == [False, False, not outside]
+    assert (rounds(cell) > 200) is not outside
 
 
 def test_copies_that_part_within_a_round_go_on_as_they_would() -> None:

@@ -1,6 +1,7 @@
 """What a whole cell does in each round of its production, held as one round: a year of it costs what a minute does."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from detent.axis import MotionStarted
@@ -72,11 +73,11 @@ class Rounds(Generic[T]):
         return self._made(self._told, self.rounds)
 
     def _made(self, what: Sequence[_Told], first: int) -> Iterator[tuple[int, Any]]:
-        period, new = self.period, _new
-        for number in range(first, self.rounds + 1):
-            by = number * period
-            for unit, kind, at, rest, motion, growth in what:
-                if motion is None:
-                    yield unit, new(kind, (at + by, *rest))
-                else:
-                    yield unit, later(motion, by, number * growth)
+        return chain.from_iterable(self._round(what, number) for number in range(first, self.rounds + 1))
+
+    def _round(self, what: Sequence[_Told], number: int) -> list[tuple[int, Any]]:
+        by, new = number * self.period, _new
+        return [
+            (unit, new(kind, (at + by,) + rest) if motion is None else later(motion, by, number * growth))  # noqa: RUF005
+            for unit, kind, at, rest, motion, growth in what
+        ]

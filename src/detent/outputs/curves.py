@@ -150,13 +150,18 @@ def instructions(signals: Signals, name: str) -> list[Band]:
     return bands
 
 
+_OF_PROGRAMS = (Executing, Finished, Powered)
+
+
 def _executed(recording: Recording, unit: int) -> Iterator[Entry | Band]:
     """The entries of a unit; a band for many turns of a loop."""
     for piece in recording.pieces():
         if isinstance(piece, tuple):
             if piece[0] == unit:
                 yield from piece[1]
-        elif isinstance(piece, Rounds) or piece.count < MANY_TURNS:
+        elif isinstance(piece, Rounds):
+            yield from piece.of(unit, _OF_PROGRAMS)
+        elif piece.count < MANY_TURNS:
             yield from piece.of(unit)
         else:
             yield from (Band(turn.begins, piece.ends, "") for turn in piece.turns if turn.unit == unit)
