@@ -292,7 +292,7 @@ def plan(draw: Random) -> Plan:
             text += f'[switches.s]\naxis = "u{unit}"\n{ends}\ndrives = ["u{unit}.{pin}"]\n'
     deeds = []
     for _ in range(draw.randint(1, 4)):
-        gap = draw.choice((0, MS, SECOND, 20 * SECOND, 60 * SECOND)) + draw.choice((0, draw.randrange(SECOND)))
+        gap = draw.choice((0, MS, SECOND, 15 * SECOND)) + draw.choice((0, draw.randrange(SECOND)))
         deeds.append((gap, draw.randrange(len(programs)), draw.choice(DEEDS), draw.randrange(1000)))
     return Plan(text, tuple(programs), tuple(units), tuple(deeds))
 
@@ -315,7 +315,7 @@ def lived(planned: Plan, go: Callable[[Cell, Ns], None], images: list[bytes]) ->
     cell = made(planned, images)
     if cell is None:
         return None
-    go(cell, 20 * SECOND)
+    go(cell, 12 * SECOND)
     for gap, place, what, number in planned.deeds:
         go(cell, cell.now + gap)
         unit, model = f"u{place}", planned.units[place]
@@ -334,7 +334,7 @@ def lived(planned: Plan, go: Callable[[Cell, Ns], None], images: list[bytes]) ->
         else:
             with suppress(ValueError, RuntimeError):  # it is stuck already, off already, moves
                 do(cell, unit, model, what, number)
-    go(cell, cell.now + 60 * SECOND + 1234)
+    go(cell, cell.now + 30 * SECOND + 1234)
     return cell
 
 
@@ -356,7 +356,7 @@ def nobody_can_tell(_: History, planned: Plan) -> bool:
     assert again is not None
     again.run_to(run.now)
     assert list(told(again)) == list(told(stepped)), "the journal makes another recording"
-    if run.now < 120 * SECOND:
+    if run.now < 50 * SECOND:
         assert b"".join(vcd.pieces(of_cell(run))) == b"".join(vcd.pieces(of_cell(stepped)))
     return True
 
@@ -369,12 +369,12 @@ def check(count: int) -> int:
 
 
 def test_nobody_can_tell() -> None:
-    assert check(24) > 4
+    assert check(16) > 3
 
 
 @pytest.mark.slow
 def test_nobody_can_tell_in_many_more_cells() -> None:
-    assert check(1_500) > 300
+    assert check(1_000) > 200
 
 
 # -- who looks at it -------------------------------------------------------------------------------------------
