@@ -68,6 +68,33 @@ def test_the_functions_of_the_other_shells_know_the_model(shell: str, tmp_path: 
     assert sorted(word.split()[0] for word in done.stdout.splitlines()) == ["B1=", "B2=", "PARTY=", "PLC="]
 
 
+OPTIONS = {"gs-c200": {"--address", "--no-checksum", "--revision"}, "supersigma": {"--drive"}, "bs0610": {"--motor"},
+           "dcb-274": {"--name", "--mode", "--first"}}  # fmt: skip
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_options_of_a_unit_are_those_of_the_model_that_was_typed(shell: str, tmp_path: Path) -> None:
+    if shutil.which(shell) is None:
+        pytest.skip(f"{shell} is not installed")
+    script = tmp_path / "script"
+    with pytest.raises(SystemExit):
+        main(["--install-completion", "--shell", shell, "--output", str(script)])
+    every = {flag for flags in OPTIONS.values() for flag in flags}
+    for typed, expected in {**OPTIONS, "": every}.items():
+        line = {
+            "bash": f"source {script}; COMP_WORDS=(detent send {typed} --); COMP_CWORD={3 if typed else 2}; _detent; "
+            "printf '%s\n' \"${COMPREPLY[@]}\"",
+            "zsh": "_arguments() { [[ $1 == -C ]] && { state=args; return }; print -l -- ${${@#\\*}%%[\\[:]*} }; "
+            f"words=(send {typed}); . {script}",  # which calls its own function, as at the first Tab
+            "fish": f"source {script}; complete -C 'detent send {typed} --'",
+        }[shell]
+        done = subprocess.run([shell, "-c", line], capture_output=True, text=True, check=False)
+        found = {word.split()[0] for word in done.stdout.splitlines() if word.strip()}
+        assert found & every == expected, (typed, done.stderr)
+        assert {"--baud", "--patience", "--raw"} <= found
+    assert "--motor" in script.read_text()
+
+
 def test_the_choices_are_gone_again_and_each_has_its_parameter() -> None:
     from importlib import import_module
 

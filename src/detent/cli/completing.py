@@ -144,6 +144,80 @@ def narrowed(script: str, shell: str) -> str:
     return "\n".join([first, *made, rest])
 
 
+def not_for() -> dict[str, list[str]]:
+    """The options of a unit's line that are not for a model, which `UnitOptions` would refuse."""
+    from dataclasses import fields
+
+    from detent.cli.unit import UnitOptions, flag
+    from detent.realtime.connect import HOSTS
+    from detent.uart import Format
+
+    every = ["checksums" if field.name == "no_checksum" else field.name for field in fields(UnitOptions)]
+    return {
+        name: [flag(one) for one in every if one not in host.options and one not in Format._fields]
+        for name, host in HOSTS.items()
+    }
+
+
+def without_others(script: str, shell: str) -> str:
+    """The script of a shell in which the verbs that talk to a unit offer only the options of the model on the line."""
+    one = "no-checksum"  # whatever verb has this has all of them
+    made = []
+    if shell == "fish":
+        made += ["function _detent_takes", "    for word in $argv[2..]", "        switch $word"]
+        for name, flags in not_for().items():
+            dropped = " ".join(flag.removeprefix("--") for flag in flags)
+            made += [
+                f"            case {name}",
+                f"                not contains -- $argv[1] {dropped}",
+                "                return",
+            ]
+        made += ["        end", "    end", "    true", "end"]
+        dropped = {flag.removeprefix("--") for flags in not_for().values() for flag in flags}
+        lines = script.split("\n")
+        using = {line.split("'")[1] for line in lines if f" -l {one} " in line}
+        for place, line in enumerate(lines):
+            condition, option = (
+                (line.split("'")[1], line.partition(" -l ")[2].split(" ")[0]) if "'" in line else ("", "")
+            )
+            if condition in using and option in dropped:
+                takes = f"{condition}; and _detent_takes {option} (commandline -opc)"
+                lines[place] = line.replace(f"'{condition}'", f"'{takes}'", 1)
+        script = "\n".join(lines)
+    else:
+        shown = '"${COMP_WORDS[@]}"' if shell == "bash" else "$words"
+        made += ["_detent_unit() {", "  local word spec dropped=", f"  for word in {shown}; do", '    case "$word" in']
+        made += [f"      {name}) dropped=' {' '.join(flags)} ' ;;" for name, flags in not_for().items()]
+        made += ["    esac", "  done"]
+        if shell == "bash":
+            made += ['  for spec in "$@"; do', '    [[ "$dropped" == *" $spec "* ]] || echo "$spec"', "  done", "}"]
+            begin = "local -a _c=("
+            script = "\n".join(
+                line.replace(begin, f"{begin}$(_detent_unit ", 1) + ")"
+                if begin in line and f'"--{one}"' in line
+                else line
+                for line in script.split("\n")
+            )
+        else:
+            made += ["  local -a kept=()", '  for spec in "$@"; do', '    word="${${spec#\\*}%%[\\[:]*}"']
+            made += [
+                '    [[ "$dropped" == *" $word "* ]] || kept+=("$spec")',
+                "  done",
+                '  _arguments "${kept[@]}"',
+                "}",
+            ]
+            blocks = script.split("_arguments \\\n")
+            for place, block in enumerate(blocks[1:], 1):
+                if f"'--{one}[" in block:
+                    blocks[place] = "_detent_unit \\\n" + block
+                else:
+                    blocks[place] = "_arguments \\\n" + block
+            script = "".join(blocks)
+    first, _, rest = script.partition("\n")  # zsh looks for #compdef there
+    # and it calls the function of the file by itself only where there is no other: else the first Tab does nothing
+    return "\n".join([first, *made, rest.rstrip("\n"), *(['_cyclopts_detent "$@"'] if shell == "zsh" else []), ""])
+
+
 def install(
     *, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path | None = None, force: bool = False
 ) -> None:
@@ -175,7 +249,8 @@ def install(
             whole = application("*")
             kind = shell or detect_shell()
             written = whole.install_completion(shell=kind, output=output, add_to_startup=output is None)
-        write_whole(written, narrowed(written.read_text(encoding="utf-8"), kind).encode())
+        script = without_others(narrowed(written.read_text(encoding="utf-8"), kind), kind)
+        write_whole(written, script.encode())
     except OSError as error:
         failed(f"{error.filename or output}: not written: {error.strerror or error}")
     except (ValueError, RuntimeError) as error:
