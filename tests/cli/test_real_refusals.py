@@ -68,6 +68,8 @@ CASES: dict[str, tuple[Change, Callable[[FakeBoard], FakePort], str, str]] = {
     "no board": (("fake:", "/dev/serial/by-id/usb-Klipper_x"), FakePort, "boards.b.serial",
                  "cannot be opened: No such file or directory; look at /dev/serial/by-id and plug it in"),
     "no serial device": (("fake:", "/dev/null"), FakePort, "boards.b.serial", "is no serial device"),
+    "a directory": (("fake:", "/dev"), FakePort, "boards.b.serial",
+                    "/dev is a directory: name the board's device in it"),
     "another device": (SAME, no_answer, "boards.b.serial", "it does not answer"),
     "a firmware too old for stops": (SAME, old("trsync_start", "stepper_stop_on_trigger"), "boards.b.serial",
                                      "stepper_stop_on_trigger, trsync_start"),
@@ -110,7 +112,7 @@ CASES: dict[str, tuple[Change, Callable[[FakeBoard], FakePort], str, str]] = {
 }  # fmt: skip
 
 
-MAY_PASS = {"no board", "no serial device", "another device", "a driver that does not answer"}
+MAY_PASS = {"no board", "a directory", "no serial device", "another device", "a driver that does not answer"}
 
 
 @pytest.mark.parametrize("verb", ["boards check", "serve"])

@@ -58,6 +58,8 @@ class SerialPort:
         device = self._device
         try:
             self._descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except IsADirectoryError:
+            raise PortError(f"{device} is a directory: name the board's device in it") from None
         except OSError as error:
             remedy = "join the group of the device (dialout)" if isinstance(error, PermissionError) else (
                 "look at /dev/serial/by-id and plug it in")  # fmt: skip
