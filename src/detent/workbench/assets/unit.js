@@ -411,7 +411,7 @@ part("unit", (box) => {
     parts[0].append(worded("b", "mono", line));
     if (told.length > 1) {
       const same = JSON.stringify(told[0].answers) === JSON.stringify(told[1].answers) && told[0].refused === told[1].refused;
-      const by = told[0].ms !== null && told[1].ms !== null ? `, ${(told[0].ms - told[1].ms).toFixed(1)} ms between them` : "";
+      const by = told[0].ms !== null && told[1].ms !== null ? `, ${Math.abs(told[0].ms - told[1].ms).toFixed(1)} ms between them` : "";
       parts[0].append(worded("span", same ? "same" : "differ", same ? ` the same answers${by}` : ` they differ${by}`));
     }
     role("answers").replaceChildren(...parts);
