@@ -52,27 +52,18 @@ def test_stop_is_reached_on_every_page_whatever_is_open(
         window.page.locator(".tour .skip").click()
 
 
-def press_escape(window: Window, at: float) -> None:
-    """Esc, as if it were pressed at `at`, in seconds since 1970: however busy this computer is."""
-    session = window.page.context.new_cdp_session(window.page)
-    for kind in ("keyDown", "keyUp"):
-        session.send("Input.dispatchKeyEvent", {"type": kind, "key": "Escape", "code": "Escape", "timestamp": at,
-                                                "windowsVirtualKeyCode": 27})  # fmt: skip
-    session.detach()
-
-
 def test_esc_twice_stops_and_two_that_are_far_apart_do_not(windows: Windows, bench: Served, real: str) -> None:
     window = windows.new(bench).open("/unit")
     name = unit(window, real)
     window.call("unit_say", name, "M 300")
     window.until("(name) => detent.get(`r.${name}`).moving", name)
     now = window.page.evaluate("Date.now() / 1000")
-    press_escape(window, now)
-    press_escape(window, now + 0.8)
+    window.escape(now)
+    window.escape(now + 0.8)
     window.until(
         "(name) => { const it = detent.get(`r.${name}`); return it.moving && !it.stopping && !it.outcome; }", name
     )
-    press_escape(window, now + 1.4)
+    window.escape(now + 1.4)
     window.until("(name) => detent.get(`r.${name}`).moving === false", name)
     assert window.get(f"r.{name}")["outcome"] == "stops by its ramp"
 

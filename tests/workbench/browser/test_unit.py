@@ -49,8 +49,9 @@ def test_esc_twice_stops_a_unit_on_every_page(windows: Windows, bench: Served, r
     window.until("(name) => detent.get(`r.${name}`).moving", name)
     window.page.get_by_role("link", name="Scope").click()
     window.page.locator(".scope canvas").first.wait_for()
-    window.page.keyboard.press("Escape")
-    window.page.keyboard.press("Escape")
+    now = window.page.evaluate("Date.now() / 1000")
+    window.escape(now)
+    window.escape(now + 0.3)
     window.until("(name) => detent.get(`r.${name}`).moving === false", name)
     assert window.get(f"r.{name}")["outcome"] == "stops by its ramp"
 
