@@ -32,6 +32,7 @@ NEARER = 1 << 20  # ticks between that base and its pulse
 AHEAD = 256  # pulses looked at in one go; more where a run reaches so far
 _PRUNE = 12  # a little more than 6 + 4 sqrt 2
 _WORTH = 6  # steps of a run from which on it pays to look where it ends
+_PAIRS = 6  # pulses that are compared each with each, to know which `add` may suit
 
 
 class Run(NamedTuple):
@@ -273,9 +274,14 @@ def _best(lo: list[int], hi: list[int], at: int, stop: int, base: int, guess: in
     windows some 7 % before it leaves them), and this run and the next together decide.
     """
     reach = _longest(lo, hi, at, stop, base, guess)
+    steps = reach.steps
+    if steps < _WORTH:
+        _, low, high, add = reach
+        end = at + steps - 1
+        interval = ((lo[end] + hi[end]) // 2 - base - add * (steps * (steps - 1) // 2)) // steps
+        return _Found(steps, low if interval < low else high if interval > high else interval, add)
     longest = _centred(lo, hi, at, base, reach)
-    steps = longest.steps
-    if steps < _WORTH or at + steps >= stop:
+    if at + steps >= stop:
         return longest
     best, most = longest, 0
     for less in dict.fromkeys((0, max(1, steps // 20), max(1, steps // 10), steps // 6)):
@@ -293,11 +299,10 @@ def _centred(lo: list[int], hi: list[int], at: int, base: int, found: "_Reach") 
     end = at + steps - 1
     middle = (lo[end] + hi[end]) // 2 - base
     candidates = [(found.add, found.low, found.high)]
-    if steps >= _WORTH:
-        for add in (found.add - 1, found.add + 1):
-            held = _hold(lo, hi, at, end, base, add)
-            if held is not None:
-                candidates.append((add, *held))
+    for add in (found.add - 1, found.add + 1) if steps >= _WORTH else ():
+        held = _hold(lo, hi, at, end, base, add)
+        if held is not None:
+            candidates.append((add, *held))
     best, nearest = _Found(1, 0, 0), 1 << 62
     for add, low, high in candidates:
         rise = add * (steps * (steps - 1) // 2)
@@ -358,6 +363,33 @@ class _Reach(NamedTuple):
     add: int
 
 
+def _narrow(lo: list[int], hi: list[int], at: int, stop: int, base: int, least: int, most: int) -> tuple[int, int, int]:
+    """What three pulses leave of `add`, narrowed by the next few; and before which pulse every run ends.
+
+    Of pulses i < j, k * interval + add * k * (k - 1) / 2 within their windows is interval + add * (k - 1) / 2 within
+    1/k of them: what suits each pair suits all.
+    """
+    before = [(1, lo[at] - base, hi[at] - base), (2, lo[at + 1] - base, hi[at + 1] - base),
+              (3, lo[at + 2] - base, hi[at + 2] - base)]  # fmt: skip
+    for j in range(4, min(stop - at, _PAIRS) + 1):
+        low, high = lo[at + j - 1] - base, hi[at + j - 1] - base
+        if low - before[-1][2] > FAR:
+            break
+        narrow_least, narrow_most = least, most
+        for i, low_i, high_i in before:
+            apart = i * j * (j - i)
+            need, room = -(2 * (j * high_i - i * low) // apart), 2 * (i * high - j * low_i) // apart
+            if need > narrow_least:
+                narrow_least = need
+            if room < narrow_most:
+                narrow_most = room
+        if narrow_least > narrow_most:
+            return at + j - 1, least, most
+        least, most = narrow_least, narrow_most
+        before.append((j, low, high))
+    return stop, least, most
+
+
 def _longest(lo: list[int], hi: list[int], at: int, stop: int, base: int, guess: int) -> "_Reach":
     """The longest run through the windows from index `at` to before `stop`."""
     low1, high1 = lo[at] - base, hi[at] - base
@@ -374,6 +406,7 @@ def _longest(lo: list[int], hi: list[int], at: int, stop: int, base: int, guess:
         if narrow_least > narrow_most:
             return _two(low1, high1, low2, high2, max(least, -MOST_ADD), min(most, MOST_ADD))
         least, most = narrow_least, narrow_most
+        stop, least, most = _narrow(lo, hi, at, stop, base, least, most)
     least, most = max(least, -MOST_ADD), min(most, MOST_ADD)
     if least > most:
         return _Reach(1, low1, high1, 0)
