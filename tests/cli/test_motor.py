@@ -206,3 +206,17 @@ def test_settings_that_contradict_each_other_are_told_with_what_the_unit_makes_o
     facts = json.loads(said(capsys, "as1010", *words, "I=8000", "--inertia", "1e-5", "--json"))
     assert facts["remark"].startswith("V=600 is below")
     assert "remark" not in json.loads(said(capsys, "as1010", *words, "I=60", "--inertia", "1e-5", "--json"))
+
+
+def test_no_number_of_the_list_of_motors_is_cut_where_the_terminal_is_narrow(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = []
+    for columns in ("200", "60"):
+        monkeypatch.setenv("COLUMNS", columns)
+        with pytest.raises(SystemExit):
+            main(["motor"])
+        told = capsys.readouterr().out
+        assert "…" not in told
+        whole.append([word for word in told.split() if word.replace(".", "").isdigit() and float(word) < 1000])
+    assert whole[0] == whole[1]

@@ -173,14 +173,14 @@ def without_others(script: str, shell: str) -> str:
                 "                return",
             ]
         made += ["        end", "    end", "    true", "end"]
-        dropped = {flag.removeprefix("--") for flags in not_for().values() for flag in flags}
+        those = {flag.removeprefix("--") for flags in not_for().values() for flag in flags}
         lines = script.split("\n")
         using = {line.split("'")[1] for line in lines if f" -l {one} " in line}
         for place, line in enumerate(lines):
             condition, option = (
                 (line.split("'")[1], line.partition(" -l ")[2].split(" ")[0]) if "'" in line else ("", "")
             )
-            if condition in using and option in dropped:
+            if condition in using and option in those:
                 takes = f"{condition}; and _detent_takes {option} (commandline -opc)"
                 lines[place] = line.replace(f"'{condition}'", f"'{takes}'", 1)
         script = "\n".join(lines)

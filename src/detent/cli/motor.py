@@ -534,13 +534,13 @@ def _print_head(found: Made, facts: dict[str, Any]) -> None:
 
 
 def table_of(*columns: str) -> Any:
-    """A table without a frame; numbers stand at the right."""
+    """A table without a frame; numbers stand at the right, and whole: where it is narrow, words are folded."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, header_style="dim")
     for column in columns:
         left = column in ("motor", "", "maker", "margin with", " ")
-        table.add_column(column, no_wrap=True, justify="left" if left else "right")
+        table.add_column(column, no_wrap=not left, overflow="fold", justify="left" if left else "right")
     return table
 
 
