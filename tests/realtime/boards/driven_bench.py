@@ -33,6 +33,8 @@ class Wire(FakePort):
         self._clock = clock
         self.spare_exposed = False  # nothing is held up that has a time and no step before it
         self._until: dict[Value, int] = {}
+        self.hold: Callable[[], Ns] = lambda: 0  # for how long the wire stands, while its host goes on
+        self._free: Ns = 0
 
     def _exposed(self, data: bytes) -> bool:
         """Whether a board shuts down if this comes later than it says: it cannot be kept from that."""
@@ -54,7 +56,15 @@ class Wire(FakePort):
         return found
 
     def send(self, data: bytes, wall: Ns) -> None:
-        if self._exposed(data) and self.spare_exposed:
+        exposed = self._exposed(data)
+        held = 0 if exposed else self.hold()  # what follows cannot pass it
+        self._free = max(self._free, wall + held if held else 0)
+        if self._free > wall:
+            if exposed and self.spare_exposed:
+                self._free = wall
+            super().send(data, self._free)
+            return
+        if exposed and self.spare_exposed:
             super().send(data, wall)
             return
         later = max(wall, self._clock())

@@ -7,7 +7,6 @@ time, does: the first step of a motion and what guards it, and a change of an ou
 goes on from the count.
 """
 
-from collections import deque
 from itertools import pairwise
 from random import Random
 
@@ -62,7 +61,6 @@ def session(seed: int, *, writes: bool) -> tuple[int, int]:
     with Bench(GS, away=away, jitter=lambda: random.randrange(200 * US), board=board, spare_exposed=spare) as bench:
         bench.driven._forget = lambda: None  # type: ignore[method-assign]
         fake = bench.ports["b"].board
-        fake.log, fake.kept_log = deque(maxlen=1), True  # type: ignore[assignment]
         bench.run(100 * MS)
         away.on = True
         down = 0
@@ -73,7 +71,7 @@ def session(seed: int, *, writes: bool) -> tuple[int, int]:
                 assert writes, "it looked at its clock behind everything that takes time"
                 assert not spare
                 down += 1
-                assert fake.log[-1][1] in EXPOSED, "steps were late, and the board gave up"
+                assert fake.gave_up_at in EXPOSED, "steps were late, and the board gave up"
                 away.on = False
                 bench.run(100 * MS)
                 state = bench.driven.axes()[0]
@@ -103,6 +101,58 @@ def session(seed: int, *, writes: bool) -> tuple[int, int]:
             never_closer(bench)
             assert state.slips <= away.stalls, "a stall is one slip at most"
         return state.slips, down
+
+
+def held_up(seed: int) -> tuple[int, int]:
+    """A wire that stands now and then, while its host goes on, and loses blocks; slips, and boards shut down.
+
+    What has a time and no step before it may be on the wire then.
+    """
+    random, on = Random(seed), [False]
+
+    def hold() -> Ns:
+        return random.randrange(150 * MS) if on[0] and random.random() < 0.005 else 0
+
+    def spoil(data: bytes, to_board: bool) -> list[bytes]:
+        return [] if on[0] and to_board and random.random() < 0.01 else [data]
+
+    with Bench(GS, jitter=lambda: random.randrange(200 * US), port={"spoil": spoil}) as bench:
+        bench.driven._forget = lambda: None  # type: ignore[method-assign]
+        fake = bench.ports["b"].board
+        bench.ports["b"].hold = hold
+        bench.run(100 * MS)
+        down = 0
+        for _ in range(random.randrange(2, 6)):
+            on[0] = True
+            bench.type("x", random.choice(LINES).format(n=random.randrange(1, 800)))
+            bench.run(random.choice([40 * MS, 200 * MS, 700 * MS]))
+            on[0] = False
+            bench.run(150 * MS)
+            if fake.reason is not None:
+                down += 1
+                assert fake.gave_up_at in EXPOSED, "steps were late, and the board gave up"
+                bench.driven.recover()
+                bench.run(100 * MS)
+        bench.type("x", "K")
+        bench.run(SECOND)
+        bench.rest()
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.DRIVEN
+        assert sum(news.weight is Weight.FAULT for news in bench.news) == down, bench.news
+        assert state.shaft == bench.position("x") == bench.boards.steppers["x"].counted()
+        if not down:
+            never_closer(bench)
+        return state.slips, down
+
+
+@pytest.mark.slow
+def test_a_wire_that_stands_is_a_slip_in_many_sessions() -> None:
+    counts = [held_up(seed) for seed in range(100, 400)]
+    assert sum(slips for slips, _ in counts) > 200
+
+
+def test_a_wire_that_stands_is_a_slip() -> None:
+    assert sum(held_up(seed)[0] for seed in range(10)) > 3
 
 
 def never_closer(bench: Bench) -> None:

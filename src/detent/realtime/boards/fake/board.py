@@ -36,6 +36,7 @@ class FakeBoard:
         self.sent: list[tuple[int, bytes]] = []
         self.log: list[tuple[int, str, Mapping[str, Value]]] = []  # commands that were carried out
         self.kept_log = True
+        self.gave_up_at = ""  # the command that shut it down last
         numbers = words.numbered(seed, leave_out=leave_out, reset=reset)
         self.identity = words.dictionary(*numbers, frequency=frequency, pins=pins, window=window, version=version,
                                          reserved=reserved)  # fmt: skip
@@ -163,6 +164,7 @@ class FakeBoard:
                 part = self.oids.get(int(message.values["oid"]))
                 shut = self._guarded(partial(self._of_part, part, message))
             if shut:
+                self.gave_up_at = message.name
                 return  # the rest of the block is not carried out
 
     def _of_part(self, part: Any, message: Any) -> None:
