@@ -13,7 +13,7 @@ import pytest
 from tests.cell.test_idling import do, state, step_to, told
 from tests.controllers.laws.histories import History, hold
 
-from detent.cell import cycles
+from detent.cell import cycles, history
 from detent.cell.build import build
 from detent.cell.cell import Cell
 from detent.cell.description import parse
@@ -40,6 +40,11 @@ def rounds(cell: Cell) -> int:
     return sum(piece.rounds for piece in told(cell).pieces() if isinstance(piece, Rounds))
 
 
+def batches(cell: Cell) -> list[tuple[int, tuple[object, ...]]]:
+    """What is taken from its recording, in batches: whoever goes back in time counts them."""
+    return [(unit, tuple(entries)) for unit, entries in told(cell.copy()).take()]
+
+
 def within(cell: Cell) -> list[object]:
     """What a cell is made of."""
     circuit = cell.circuit
@@ -51,6 +56,7 @@ def check_alike(run: Cell, stepped: Cell) -> None:
     assert state(run) == state(stepped)
     assert list(told(run)) == list(told(stepped))
     assert len(told(run)) == len(told(stepped))
+    assert batches(run) == batches(stepped)
     assert run.circuit.deadlines == stepped.circuit.deadlines
     assert run.circuit.line_deadline == stepped.circuit.line_deadline
     if rounds(run):
@@ -175,6 +181,18 @@ def test_who_watches_sees_how_things_are() -> None:
         panel.take([(unit, (entry,)) for unit, entry in watches[-1]])
         assert [front.levels for front in panel.fronts] == [front.levels for front in fronts]
     assert watches[:3] == watches[3:]
+
+
+def test_going_back_counts_what_there_was() -> None:
+    """The way back from a copy that was kept is run in one go, and has as many batches as it had at first."""
+    past = history.History(drilling())
+    past.run_to(150 * SECOND)
+    del past._moments[1:]  # as if they were forgotten
+    past.rewind(140 * SECOND)
+    stepped = drilling()
+    step_to(stepped, past.now)
+    assert past.now > 139 * SECOND
+    assert past._here.batches == len(batches(stepped))
 
 
 def test_only_time_asked_for_in_one_go_is_passed_over() -> None:

@@ -174,8 +174,7 @@ class Cycles:
             circuit.recording = self._tap  # type: ignore[assignment]
             self._left += HOLDS * self._measures  # it may be a long one
             return False
-        entries = [(unit, entry) for unit, entries in tap.told for entry in entries]
-        kinds = {type(entry) for _, entry in entries}
+        kinds = {type(entry) for _, entries in tap.told for entry in entries}
         if not kinds <= (_PASSES if growth else _PASSES | _STANDS) or rounds < WORTH:
             self.close()
             self.longest = NEVER
@@ -188,7 +187,7 @@ class Cycles:
         circuit.now += by
         self.again()
         if circuit.recording is not None:
-            circuit.recording.turn(Rounds(entries, period, rounds, growth))
+            circuit.recording.turn(Rounds(tap.told, period, rounds, growth))
         return True
 
     def _room(self, number: int, found: Later) -> int:

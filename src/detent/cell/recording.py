@@ -156,13 +156,13 @@ class Recording:
         self._batches.append(turns)
 
     def take(self) -> list[Batch]:
-        """The batches since the last call. For somebody who keeps them elsewhere."""
+        """The batches since the last call, as many as if nothing had been passed over. For somebody who keeps them."""
         taken: list[Batch] = []
         for item in self._batches.take():
             if isinstance(item, tuple):
                 taken.append(item)
             else:
-                taken += [(unit, (entry,)) for unit, entry in item]
+                taken += item.batches()
         return taken
 
     def of(self, unit: str, *kinds: type[Entry]) -> list[Entry]:

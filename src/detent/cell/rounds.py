@@ -1,7 +1,7 @@
 """What a whole cell does in each round of its production, held as one round: a year of it costs what a minute does."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from itertools import chain
+from itertools import chain, islice
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from detent.axis import MotionStarted
@@ -26,18 +26,20 @@ class _Told(NamedTuple):
 
 
 class Rounds(Generic[T]):
-    """`entries`, pairs of a unit and what it did, `rounds` times more: each time `period` later than before.
+    """`batches`, of a unit and what it did in one go, `rounds` times more: each time `period` later than before.
 
     `growth` is how far the axis of a unit has come in a round, if it is not where it was. Entries begin with their
     time; but for motions they have no other. Never changed.
     """
 
-    __slots__ = ("_told", "kinds", "period", "rounds")
+    __slots__ = ("_sizes", "_told", "kinds", "period", "rounds")
 
     def __init__(
-        self, entries: Sequence[tuple[int, T]], period: Ns, rounds: int, growth: Mapping[int, int] = {}
+        self, batches: Sequence[tuple[int, Sequence[T]]], period: Ns, rounds: int, growth: Mapping[int, int] = {}
     ) -> None:
         self.period, self.rounds = period, rounds
+        entries = [(unit, entry) for unit, batch in batches for entry in batch]
+        self._sizes = [len(batch) for _, batch in batches]
         self.kinds = {type(entry) for _, entry in entries}  # what it is made of
         self._told: list[_Told] = []
         for unit, entry in entries:
@@ -58,6 +60,14 @@ class Rounds(Generic[T]):
     def __iter__(self) -> Iterator[tuple[int, T]]:
         """All entries with their units, made as they are asked for."""
         return self._made(self._told, 1)
+
+    def batches(self) -> Iterator[tuple[int, Sequence[T]]]:
+        """All entries in batches: what a unit did in one go."""
+        for number in range(1, self.rounds + 1):
+            made = iter(self._round(self._told, number))
+            for size in self._sizes:
+                some = list(islice(made, size))
+                yield some[0][0], tuple(entry for _, entry in some)
 
     def with_kinds(self, kinds: Collection[type]) -> Iterator[tuple[int, T]]:
         """Those of these kinds, with their units."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from heapq import merge
+from itertools import groupby
 from operator import itemgetter
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
@@ -63,6 +64,11 @@ class Turns(Generic[T]):
         if len(self.turns) == 1:
             return ((unit, entry) for _, unit, entry in self._of(self.turns[0]))
         return ((unit, entry) for _, unit, entry in merge(*map(self._of, self.turns), key=itemgetter(0)))
+
+    def batches(self) -> Iterator[tuple[int, Sequence[T]]]:
+        """All entries in batches: what a unit did in one instant."""
+        for (unit, _), some in groupby(self, key=lambda entry: (entry[0], entry[1].at)):
+            yield unit, tuple(entry for _, entry in some)
 
     def of(self, unit: int) -> Iterator[T]:
         """The entries of one unit."""
