@@ -49,7 +49,7 @@ def compare_moves(
     variants
         How many are drawn, beside all corners (512).
     seed
-        Of the draws: the same seed draws the same variants.
+        Seed of the draws: the same one draws the same variants.
     plot
         Draw speed and torque used: a .png, .svg or .pdf file.
     overwrite

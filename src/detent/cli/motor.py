@@ -71,7 +71,7 @@ def motor(
     variants
         How many of them are drawn, beside all corners (512; 0: none, and no corners).
     seed
-        Of the draws: the same seed draws the same variants.
+        Seed of the draws: the same one draws the same variants.
     sensitivity
         The same move with more and less inertia, friction and voltage, one at a time.
     pull_in

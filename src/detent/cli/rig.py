@@ -48,7 +48,7 @@ class RigOptions:
         The damping from a full step: overshoot as a part of the step (0.45), and settling time in s if known
         (0.45,0.03), or a CSV file of seconds and places.
     inertia
-        Of the load at the shaft, kg m2; that of the rotor again unless given (where the maker gives none: of both).
+        Inertia of the load at the shaft, kg m2; unless given that of the rotor (where the maker gives none: of both).
     friction
         Coulomb friction at the shaft, Nm.
     viscous
@@ -74,7 +74,7 @@ class RigOptions:
     driven_inertia
         Inertia behind the gear, kg m2.
     efficiency
-        Of gear and screw, above 0, at most 1.
+        Efficiency of gear and screw, above 0, at most 1.
     load_by
         CSV file of a load that changes: seconds (or turns, or m) and Nm, with a first line like 's, Nm'.
     fit

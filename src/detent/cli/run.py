@@ -74,7 +74,7 @@ def run(
     line_timing
         Let characters take their time on the serial line.
     allow_loss
-        A motor that loses steps is told, and no failure.
+        Tell of a motor that loses steps, but do not fail because of it.
     force
         Write over files that no run has made.
     json

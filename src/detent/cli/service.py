@@ -40,9 +40,9 @@ def service(
     cell
         A cell file (CELL.toml).
     name
-        Of the unit; without it detent- and the name of the cell file.
+        Name of the unit; by default detent- and the name of the cell file.
     user
-        Who runs it; without it you. Has to be allowed to open the serial ports.
+        User who runs it, by default you; must be allowed to open the serial ports.
     control
         Listen on HOST:PORT for `detent control`, as `serve --control` does.
     output

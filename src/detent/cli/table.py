@@ -41,11 +41,11 @@ def table(
         sine: peak sin^2(angular t + phase), the paper's; linear: from low to high; or a file of lines t,V
         (seconds, half steps/s) with straight lines between them.
     peak
-        Of the sine, in half steps/s: 15000.
+        Peak of the sine, in half steps/s: 15000.
     angular
-        Of the sine, in radians/s: 4.54426.
+        Angular rate of the sine, in radians/s: 4.54426.
     phase
-        Of the sine, in radians: 0.2097.
+        Phase of the sine, in radians: 0.2097.
     low
         Where the linear curve starts, in half steps/s: 650.
     high

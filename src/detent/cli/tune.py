@@ -77,7 +77,7 @@ def tune(
     variants
         How many fresh variants must make them in the end (2048).
     seed
-        Of the draws: the same seed gives the same answer.
+        Seed of the draws: the same one gives the same answer.
     each_move
         Settings for each move alone, to be sent before it.
     map_

@@ -50,7 +50,7 @@ def workbench(
     """Show a controller or a cell in a browser, running in real time.
 
     Without a target it is the drilling cell of the GS-C200 datasheet. With a model and a port it is the unit there, and
-    the same model by the book beside it. The address to open is printed; Ctrl-C ends it.
+    beside it the same model, emulated. The address to open is printed; Ctrl-C ends it.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def workbench(
         Listen on this port; 0: any free one. Without it 8274, so that a browser knows the workbench again; if that is
         taken, the next that is free, and it says so.
     token
-        Let in only who knows this word of at least 8 characters, on loopback one by chance unless you say; the address
-        that is printed has it. Programs at --control have to know it, too.
+        Let in only who knows this word of at least 8 characters; on loopback a random one unless you give one. The
+        address that is printed has it, and programs at --control must know it, too.
     open_
         Open the address in the browser of this machine.
     folder
@@ -89,7 +89,7 @@ def workbench(
     set_
         OPTION=VALUE, or UNIT.OPTION=VALUE for a cell.
     memory
-        So many MB, about, the past may take; what is older is dropped, and the time line then begins later.
+        How many MB, about, the past may take; what is older is dropped, and the time line then begins later.
     state
         Keep EEPROM images and drafts in this folder instead of $XDG_STATE_HOME/detent or ~/.local/state/detent.
     control
