@@ -12,7 +12,7 @@ from detent.hosts.axis import Limits, Speeds
 from detent.hosts.dcb274 import BlockingDcb274, Dcb274
 from detent.hosts.dcb274.answers import Listed
 from detent.hosts.dcb274.memory import HalfWritten, hex_lines
-from detent.hosts.errors import Busy, MotionFailed, NoAnswer, Refused
+from detent.hosts.errors import Busy, DriverError, MotionFailed, NoAnswer, Refused
 from detent.hosts.exchange import Progress
 
 SWITCHES = """
@@ -568,3 +568,48 @@ def test_esc_before_the_sign_on_is_obeyed_and_no_failure() -> None:
     assert cell.controllers()["unit"].status(cell.now).state == "running"
     other.abort()
     assert cell.controllers()["unit"].status(cell.now).state == "ready"
+
+
+class Damaging(HostPort):
+    """A port that changes a bit of one character, on its way out or on its way back."""
+
+    def __init__(self, cell: Cell, out: int, back: int, bit: int) -> None:
+        super().__init__(cell)
+        self.out, self.back, self.bit = out, back, bit
+
+    def write(self, data: bytes) -> None:
+        super().write(bytes(value ^ (self._due("out") << self.bit) for value in data))
+
+    def receive(self, timeout: float) -> bytes:
+        return bytes(value ^ (self._due("back") << self.bit) for value in super().receive(timeout))
+
+    def _due(self, way: str) -> int:
+        setattr(self, way, getattr(self, way) - 1)
+        return int(getattr(self, way) == -1)
+
+
+@pytest.mark.parametrize("way", ["stop", "halt"])
+@pytest.mark.parametrize("mode", ["single", "party"])
+@pytest.mark.parametrize("fresh", [False, True])
+def test_a_stop_that_returns_has_stopped_the_axis_whatever_bit_was_changed(mode: str, fresh: bool, way: str) -> None:
+    for place in range(4 if fresh else 3):
+        for bit in range(8):
+            for out in (True, False):
+                strap = 'straps = { PARTY = "high" }\noptions = { name = "X" }\n' if mode == "party" else ""
+                made = build(parse(f'[units.unit]\nmodel = "dcb-274"\n{strap}', "cell"), str)
+                first = BlockingDcb274(Dcb274("X", mode=mode), HostPort(made))
+                first.run_at(300)
+                far = 14 if fresh and mode == "party" else 0  # behind what spoils the line
+                port = Damaging(made, place + far if out else 999, 999 if out else place, bit)
+                unit = BlockingDcb274(Dcb274("X", mode=mode), port) if fresh else first
+                unit.port = port
+                try:
+                    getattr(unit, way)()
+                except DriverError:
+                    continue
+                made.run_to(made.now + 5_000_000_000)
+                status = made.controllers()["unit"].status(made.now, "")
+                assert status.state in ("ready", "programming", "sign on"), (place, bit, out)
+                before = status.pulses
+                made.run_to(made.now + 5_000_000_000)
+                assert made.controllers()["unit"].status(made.now, "").pulses == before, (place, bit, out)

@@ -1,8 +1,10 @@
 import asyncio
+import contextlib
 import errno
 import os
 import pty
 import socket
+import threading
 import time
 import tty
 from collections.abc import Callable, Coroutine, Iterator
@@ -13,6 +15,7 @@ import pytest
 
 from detent.hosts.errors import NoAnswer, PortLost
 from detent.hosts.exchange import Asynchronous, Blocking, Clear, Driver, Steps, operation, until
+from detent.realtime import ports
 from detent.realtime.addresses import Address, PortError, port_error
 from detent.realtime.async_ports import open_async_port
 from detent.realtime.ports import open_port
@@ -257,6 +260,29 @@ def test_whoever_may_not_open_a_device_is_told_the_group() -> None:
     denied = PermissionError(errno.EACCES, "Permission denied")
     text = str(port_error(Address("device", "/dev/no-such-device"), denied))
     assert text.endswith("no permission; add yourself to the group dialout (sudo usermod -aG) and log in again")
+
+
+@pytest.mark.parametrize("says", [b"x" * 4096, b"\r\n", bytes((255, 250, 44)) + b"\xff\xff" * 999, b"\xff\xfd\x00"])
+def test_who_says_something_else_all_the_time_is_no_port_of_another_computer(
+    says: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ports, "CONNECT_SECONDS", 0.5)
+    gone = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def babble() -> None:
+            client, _ = listener.accept()
+            with client, contextlib.suppress(OSError):
+                while not gone.wait(0.002):
+                    client.sendall(says)
+
+        thread = threading.Thread(target=babble)
+        thread.start()
+        try:
+            assert "does RFC 2217 live there?" in refusal(f"rfc2217://127.0.0.1:{listener.getsockname()[1]}")
+        finally:
+            gone.set()
+            thread.join()
 
 
 def test_where_rfc_2217_is_not_spoken_the_raw_address_is_named() -> None:

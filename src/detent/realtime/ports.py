@@ -11,7 +11,8 @@ import select
 import socket
 import threading
 import time
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Protocol, TypedDict
 
 from detent.realtime.addresses import CLOSED, CONNECT_SECONDS, Address, PortError, port_error
@@ -172,10 +173,47 @@ def _open_serial(address: Address, form: Format) -> Wire:
         serial = serialx.serial_for_url(
             str(address), connect_timeout=CONNECT_SECONDS, write_timeout=STALLED_SECONDS, **settings(form)
         )
-        serial.open()
+        try:
+            with _ends_in(CONNECT_SECONDS, serial):
+                serial.open()
+        except BaseException:
+            with contextlib.suppress(OSError, serialx.SerialException):
+                serial.close()
+            raise
         return _Serial(serial)
     except (TerminalError, serialx.SerialException) as error:
         raise port_error(address, error) from error
+
+
+@contextmanager
+def _ends_in(seconds: float, serial: "BaseSerial") -> Iterator[None]:
+    """What is asked of a port of another computer is over in so many seconds.
+
+    serialx waits so long for each piece of an answer, and so for ever where other things come. Raises TimeoutError.
+    """
+    late, over = threading.Event(), threading.Event()
+
+    def end_it() -> None:
+        late.set()
+        while not over.is_set():
+            link: socket.socket | None = getattr(serial, "_socket", None)
+            if link is not None:
+                with contextlib.suppress(OSError):  # it is closed already
+                    link.shutdown(socket.SHUT_RDWR)
+            over.wait(0.1)  # it may have been about to connect
+
+    timer = threading.Timer(seconds, end_it)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    except Exception as error:
+        if late.is_set():
+            raise TimeoutError from error
+        raise
+    finally:
+        over.set()
+        timer.cancel()
 
 
 class _Stream:
@@ -296,7 +334,8 @@ class _Serial:
         self._serial.write(data)
 
     def set_format(self, form: Format) -> None:
-        self._serial.reconfigure_port(**settings(form))
+        with _ends_in(CONNECT_SECONDS, self._serial):
+            self._serial.reconfigure_port(**settings(form))
 
     def close(self) -> None:
         self._serial.close()

@@ -217,7 +217,7 @@ class SingleMode(Handshake):
         A unit that ramps down says nothing. So where other things come again and again the line babbles: that is told
         soon, and a silence only when it is longer than a ramp.
         """
-        heard, wrong, others, began = b"", 0, 0, None
+        heard, wrong, others, began, sure = b"", 0, 0, None, known
         asked = not signed_on
         for _ in range(STOP_TRIES):
             yield Clear()
@@ -242,11 +242,11 @@ class SingleMode(Handshake):
                     heard, wrong = answer.data, wrong + 1
                     continue
             answer = yield Ask(CR, until(b"\r\n"), self.patience)
-            if answer.data == b"\r\n":
+            if answer.data == b"\r\n" and (sure or not (yield from self._stores_lines())):
                 return
             if answer.data == CR:  # which no unit echoes
                 raise BadAnswer(self.title, ECHOES, Spoken(b"@\r", b"@\r"))
-            heard, known, wrong = answer.data, False, wrong + 1
+            heard, known, sure, wrong = answer.data, False, False, wrong + 1
             if wrong >= TRIES:
                 break
         spoken = Spoken(b"@\r", heard)
@@ -259,10 +259,17 @@ class SingleMode(Handshake):
         raise NoAnswer(self.title, what, spoken, "abort() sends ESC")
 
     def _end_program_mode(self) -> Steps[None]:
-        """P, if X is refused: lines are stored then (page 47). An empty line is taken."""
-        told = yield from attempt(self._among_reports("X"))
-        if told == "#":
+        """P, if lines are stored (page 47). An empty line is taken."""
+        if (yield from self._stores_lines()):
             yield from attempt(self.line("P", STORED))
+
+    def _stores_lines(self) -> Steps[bool]:
+        """Whether X is refused, and again: the first may have stood behind something. P where none are begins that."""
+        for _ in range(2):
+            told = yield from attempt(self._among_reports("X"))
+            if told != "#":
+                return False
+        return True
 
     def over(self) -> Steps[bool]:
         """X is in no line that a program prints, so its echo is found among them; without one a program runs."""
@@ -387,24 +394,35 @@ class PartyLine(Handshake):
     def interrupt(self, character: bytes, *, known: bool) -> Steps[None]:
         """Name and character, each echoed, and LF; before that may come the end of a command that waited.
 
-        The first time all of it is said, whatever comes back: who hears it stops, though we may not hear that.
+        Where not even the name is echoed, all of it is said all the same: who hears it stops, though we may not hear
+        that. A letter that is echoed wrongly is taken back, as it may be another command.
         """
         yield Clear()
         if not known:
             yield Ask(SPOIL + LF)
             yield Pause(SPACING)
             yield Clear()
-        entered, echo = (self.name.encode("latin-1") + character), b""
-        for count in range(len(entered)):
-            patience = self.patience if echo == entered[:count] else SPACING
-            echo += (yield Ask(entered[count : count + 1], length(1), patience)).data
-        if echo != entered:
-            yield Ask(LF)
+        name = self.name.encode("latin-1")
+        heard = (yield Ask(name, length(1), self.patience)).data == name
+        if not heard or (yield Ask(character, length(1), self.patience)).data != character:
+            yield Ask(SPOIL + LF if heard else character + LF)
             yield Pause(SPACING)
             yield from self.enter(character.decode("latin-1"), TRIES - 1)
+            if not heard:
+                yield from self.ask(LF, until(b"\n"), self.patience)
+                yield from self._end_program_mode()
+                yield from self.enter(character.decode("latin-1"), TRIES - 1)
         ended = yield from self.ask(LF, until(b"\n"), self.patience)
         if ended.startswith(b"#"):
             yield from self.ask(b"", until(b"\n"), self.patience)
+
+    def _end_program_mode(self) -> Steps[None]:
+        """P, if it does not say how it moves, and again: lines are stored then (page 47). A bit makes P of @."""
+        for _ in range(2):
+            told = yield from attempt(self.line("^", 0.0))
+            if not isinstance(told, str) or told.strip():
+                return
+        yield from attempt(self.line("P", STORED))
 
     def over(self) -> Steps[bool]:
         """Whether it says how it moves."""
