@@ -14,7 +14,7 @@ from detent.hosts.gsc200.commands import Commands
 from detent.hosts.gsc200.dialogue import TRIES, Again
 
 LEAVING = (
-    "it is in programming mode, which a GS-C200 leaves only by execute() (E), and that starts the program; "
+    "it is in programming mode, which a GS-C200 leaves only by E (execute() in Python), and that starts the program; "
     "or switch it off and on"
 )
 
