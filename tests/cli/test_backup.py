@@ -175,7 +175,7 @@ def test_a_gs_c200_in_programming_mode_says_how_to_leave_it(tmp_path: Path, caps
         with connect("gs-c200", address(service)) as unit:
             unit.write_program(["C1"])
         run("restore", "gs-c200", address(service), file, "--yes", status=1)
-    assert "it is in programming mode, which a GS-C200 leaves only by E (execute() in Python)" in capsys.readouterr().err
+    assert "programming mode, which a GS-C200 leaves only by E (execute() in Python)" in capsys.readouterr().err
 
 
 def test_a_line_that_is_none_of_the_models_is_found_before_anything_is_written(

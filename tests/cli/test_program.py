@@ -65,7 +65,7 @@ def test_a_module_that_is_left_in_programming_mode_is_told(tmp_path: Path, capsy
         assert told[0] == "Stored 3 instructions, 6 bytes, read them back, and saved it"
         assert told[1].startswith("What the gs-c200 is sent now is stored, too: it is in programming mode")
         run("upload", "gs-c200", address(service), file, "--json")
-        assert "execute() (E)" in json.loads(capsys.readouterr().out)["left_open"]
+        assert "E (execute() in Python)" in json.loads(capsys.readouterr().out)["left_open"]
         file.write_text("; nothing\n")
         run("send", "gs-c200", address(service), "E", "Z")
         capsys.readouterr()
