@@ -141,13 +141,14 @@ class Equipment:
             if stop.dry(wall) and not self.steppers[stop.stepper].resting:
                 stop.ask_dry(wall)
         for name, stop in self.stops.items():
-            if stop.pending:
+            if stop.pending and not self.steppers[name].of.waits:
                 settle([axis for axis in self.steppers.values() if axis.of is self.steppers[name].of], now, wall)
                 stop.commit(wall)
         settle(self.steppers.values(), now, wall)
         for name, due in self._dues().items():
-            self.stops[name].before_steps(due, wall)
-        self._send(tuple(self.steppers.values()), now, wall, most)
+            if not self.steppers[name].of.waits:
+                self.stops[name].before_steps(due, wall)
+        self._send([axis for axis in self.steppers.values() if not axis.of.waits], now, wall, most)
         for name, due in self._dues().items():
             self.stops[name].behind_steps(due, wall)
         return waits

@@ -25,6 +25,7 @@ class Axis(Protocol):
     """What a lag needs of an axis."""
 
     of: "Lag"
+    dried: bool  # it waits until it is told anew what was late
 
     @property
     def told_through(self) -> Ns | None:
@@ -59,6 +60,11 @@ class Lag:
         self.now: Ns = 0
         self.slips = 0
         self.slipped: Ns = 0
+
+    @property
+    def waits(self) -> bool:
+        """Whether an axis ran dry, and has yet to be told what it did not make: the others go on with it."""
+        return any(axis.dried for axis in self.axes)
 
     def rested(self, first: Ns, now: Ns) -> None:
         """At cell time `now` an axis begins to move, its first pulse at `first`: all of them may have been at rest."""
@@ -99,7 +105,7 @@ def settle(axes: Iterable[Axis], now: Ns, wall: WallNs) -> None:
     """Let lags grow as what the cell gave up to `now` needs it, before anything of it is sent, or armed for it."""
     found: dict[Lag, list[tuple[Late, Axis]]] = {}
     for axis in axes:
-        late = axis.late(now, wall)
+        late = None if axis.of.waits else axis.late(now, wall)
         if late is not None:
             found.setdefault(axis.of, []).append((late, axis))
     for lag, ones in found.items():

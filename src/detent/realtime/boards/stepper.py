@@ -85,6 +85,7 @@ class Stepper:
         self._proved = True  # the count was compared since the last pulse
         self._doubted: tuple[int, WallNs] | None = None  # by how much the count differed, and when that is believed
         self.said = 0  # messages up to its newest step
+        self.dried = False  # it waits for `rewind`, as its steps were late
 
     # -- configuration
 
@@ -253,7 +254,7 @@ class Stepper:
         self._runs = None
         self._told = self._sent = shaft
         self._halted = False
-        self._regaining = not slipped
+        self._regaining, self.dried = not slipped, False
         self._proved, self._doubted = False, None
 
     def next_pulse(self) -> Ns | None:
@@ -339,7 +340,7 @@ class Stepper:
         spans = deque(replace(span) for span in self._spans)
         channels = [(channel.last, channel.up) for channel in self._channels]
         own = (self._own, self._told, self._sent, self._sent_at, self._not_before, self._regaining, self._proved,
-               self._through, self._halted, self.said)  # fmt: skip
+               self._through, self._halted, self.said, self.dried)  # fmt: skip
         of = self.of
         shared = of.now, of.slips, of.slipped
 
@@ -348,7 +349,7 @@ class Stepper:
             for channel, told in zip(self._channels, channels, strict=True):
                 channel.last, channel.up = told
             (self._own, self._told, self._sent, self._sent_at, self._not_before, self._regaining, self._proved,
-             self._through, self._halted, self.said) = own  # fmt: skip
+             self._through, self._halted, self.said, self.dried) = own  # fmt: skip
             of.now, of.slips, of.slipped = shared
 
         return undo
@@ -419,9 +420,9 @@ class Stepper:
 
     # -- what the firmware does
 
-    def halt(self) -> None:
-        """The firmware has stopped it, or is gone: nothing more is sent until `rewind`."""
-        self._halted = True
+    def halt(self, *, dry: bool = False) -> None:
+        """The firmware has stopped it, or is gone: nothing more is sent until `rewind`. `dry`: its steps were late."""
+        self._halted, self.dried = True, dry
         self.said = 0
         self._spans.clear()
         self._runs = None

@@ -204,7 +204,7 @@ class Stop:
     def ask_dry(self, wall: WallNs) -> None:
         """It is `dry`: have it say where the stepper stands. It gets no steps before its event was dealt with."""
         self._asked = True
-        self._axis.halt()
+        self._axis.halt(dry=True)
         self._core.ask("trsync_trigger", "trsync_state", self._answered, wall, oid=self.oid, reason=DRY)
 
     def _answered(self, message: Message, wall: WallNs) -> None:
@@ -288,7 +288,7 @@ class Stop:
         core = self._core
         watched = next((one for one in self._inputs.values() if one.reason == reason), None)
         self._asked = False
-        self._axis.halt()
+        self._axis.halt(dry=reason == DRY)
         name = watched.setup.name if watched is not None else ""
         level = self._levels.get(name, True)
         levels: dict[str, bool] = {}
