@@ -54,8 +54,8 @@ def test_a_tuned_move_is_told_with_what_is_proved_of_it(capsys: pytest.CaptureFi
     [
         ("gs-c200", "S20\nT50\nR100\n+60\n"),
         ("dcb-274", "I 200\nV 1500\nK 10 10\nD 1\n+ 60\n"),
-        ("bs0710", "X\n8!\n100K\n800R\n1000P\n60G\n"),
-        ("supersigma", 'table = "0:1"\nshort = "off"\n'),
+        pytest.param("bs0710", "X\n8!\n100K\n800R\n1000P\n60G\n", marks=pytest.mark.slow),  # their spaces take
+        pytest.param("supersigma", 'table = "0:1"\nshort = "off"\n', marks=pytest.mark.slow),  # long to be made
     ],
 )
 def test_a_file_that_sets_nothing_is_told_before_the_work(

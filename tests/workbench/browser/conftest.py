@@ -45,9 +45,12 @@ def chromium() -> Iterator[Any]:
         browser.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Served]]:
-    """Start a workbench with other arguments (a cell file, options); it serves until all tests are done."""
+    """Start a workbench with arguments (a cell file, options); it serves until the tests of the file are done.
+
+    No longer, as each of them is a cell in real time that takes its share of the processor.
+    """
     with ExitStack() as stack:
         running: dict[tuple[str, ...], Served] = {}
 
@@ -60,10 +63,17 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Se
         yield start
 
 
-@pytest.fixture
-def workbench(chromium: Any, serve: Callable[..., Served]) -> Served:
+@pytest.fixture(scope="session")
+def drilling(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """The workbench as it opens without a word: the drilling cell, running."""
-    return serve()
+    with served(tmp_path_factory.mktemp("workbench")) as found:
+        yield found
+
+
+@pytest.fixture
+def workbench(chromium: Any, drilling: Served) -> Served:
+    """The workbench of the drilling cell; without a browser none is started."""
+    return drilling
 
 
 @pytest.fixture(scope="module")
