@@ -82,9 +82,8 @@ class Cycles:
 
     def __init__(self, circuit: Circuit) -> None:
         self._circuit = circuit
-        self.longest: Ns = (
-            0  # whoever runs the circuit lets `meet` know of times in which nothing happens, from that on
-        )
+        # whoever runs the circuit lets `meet` know of times in which nothing happens, from that on
+        self.longest: Ns = 0
         self._most: Ns = 0  # the longest that was met
         self._measures = FIRST
         self._left = FIRST  # instants until the while is over

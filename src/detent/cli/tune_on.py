@@ -98,7 +98,7 @@ def tune_on(
     from detent.realtime.trial_log import LogUnusable, TrialLog
     from detent.tuner.machine.bench import bench as bench_of
     from detent.tuner.machine.carriage import MachineError
-    from detent.tuner.machine.session import OtherRun
+    from detent.tuner.machine.session import NothingToShip, OtherRun
 
     try:
         law, begin = _settings(model, machine)
@@ -120,6 +120,8 @@ def tune_on(
                 result = _carried_out(found, plan, bench, log, machine, quiet=json)
         except OtherRun as error:
             asked_wrongly(f"{path}: {error}")
+        except NothingToShip as error:
+            failed(f"{error}\n  every trial is in {path}; behind that, begin with another --log")
         except (MachineError, DriverError) as error:
             failed(f"{error}\n  the log is {path}; with the carriage on the witness the same command goes on from it")
         except LogUnusable as error:

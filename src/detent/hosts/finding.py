@@ -28,7 +28,10 @@ import re
 from collections.abc import Callable, Generator, Iterable, Sequence
 from typing import Final, NamedTuple, TypeAlias
 
-from detent.hosts.dcb274.handshake import BS, LF, SINGLE_LONGEST, SPOIL, NotListening, PartyLine, SingleMode, is_name
+from detent.hosts.dcb274.handshake import BS, LF, SINGLE_LONGEST, NotListening
+from detent.hosts.dcb274.names import is_name
+from detent.hosts.dcb274.party_line import SPOIL, PartyLine
+from detent.hosts.dcb274.single_mode import SingleMode
 from detent.hosts.errors import DriverError, Refused
 from detent.hosts.exchange import Answer, Ask, Clear, Pause, Progress, Rest, length, until
 from detent.hosts.gsc200.frames import Frames

@@ -13,7 +13,7 @@ from detent.motors.load import Load
 from detent.motors.move import simulate
 from detent.motors.rotor import Rig
 from detent.tuner.machine.carriage import MachineError, Room
-from detent.tuner.machine.session import OtherRun, Plan, Result, left_safe
+from detent.tuner.machine.session import NothingToShip, OtherRun, Plan, Result, left_safe
 
 SHORT = Room(travel=220, behind=40, turn=8, rate=400)
 SAFE = ("S=60", "T=400", "R=40")
@@ -279,9 +279,13 @@ class TestWhatGoesWrong:
 
     def test_what_it_begins_with_loses_already(self) -> None:
         bed = gsc200s()
-        with pytest.raises(MachineError, match="R=2 already, with which it began"):
+        with pytest.raises(NothingToShip, match="R=2 already, with which it began"):
             bed.run(short(bed, begin=("S=60", "T=400", "R=2")))
         bed.stays_within(SHORT)
+        again = gsc200s()  # no trial is left to make: the same words, and nothing moves
+        with pytest.raises(NothingToShip, match="R=2 already, with which it began"):
+            again.run(short(again, begin=("S=60", "T=400", "R=2")), bed.records)
+        assert max(again.port.seen) < 1
 
 
 def walled(wall: str) -> Cell:

@@ -9,8 +9,8 @@ ask for anything.
 from typing import Final
 
 from detent.hosts.dcb274.answers import Inputs, JogInputs, Ports, Settings
-from detent.hosts.dcb274.handshake import SingleMode
 from detent.hosts.dcb274.ranges import LARGEST_ADDRESS, MOST_STEPS, between, place, program_address, sign, speed
+from detent.hosts.dcb274.single_mode import SingleMode
 from detent.hosts.dcb274.unit import CLEARING, SAVING, Unit
 from detent.hosts.errors import BadAnswer, DriverError
 from detent.hosts.exchange import Ask, Rest, Steps, operation

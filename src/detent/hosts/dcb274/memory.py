@@ -10,9 +10,10 @@ from typing import Final, NamedTuple
 
 from detent.hosts.dcb274.answers import Listed, Listing
 from detent.hosts.dcb274.commands import CELLS_AT_ONCE, Commands
-from detent.hosts.dcb274.handshake import CR, SingleMode
+from detent.hosts.dcb274.handshake import CR
 from detent.hosts.dcb274.programs import END, NO_PROGRAM, SHADOW, SIZE, behind, holds, led_to, left_over
 from detent.hosts.dcb274.ranges import LARGEST_ADDRESS, between, program_address
+from detent.hosts.dcb274.single_mode import SingleMode
 from detent.hosts.errors import BadAnswer, Busy, DriverError, Refused, Spoken
 from detent.hosts.exchange import Ask, Progress, Steps, operation
 

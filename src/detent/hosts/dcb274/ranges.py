@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Final
 
-from detent.hosts.dcb274.handshake import is_name
+from detent.hosts.dcb274.names import is_name
 
 FARTHEST: Final = 8_388_607  # steps from the origin (page 47)
 MOST_STEPS: Final = 16_777_215  # of one index (page 55)

@@ -4,22 +4,13 @@ from collections.abc import Iterable
 from typing import Final
 
 from detent.hosts.axis import Axis
+from detent.hosts.dcb274.adapter import Adapter
 from detent.hosts.dcb274.answers import Settings
-from detent.hosts.dcb274.handshake import (
-    CTRL_C,
-    CTRL_N,
-    CTRL_P,
-    RESET,
-    TRIES,
-    Adapter,
-    DaisyChain,
-    Handshake,
-    NotListening,
-    PartyLine,
-    SingleMode,
-    is_name,
-)
+from detent.hosts.dcb274.handshake import CTRL_C, CTRL_N, CTRL_P, RESET, TRIES, Handshake, NotListening
+from detent.hosts.dcb274.names import is_name
+from detent.hosts.dcb274.party_line import DaisyChain, PartyLine
 from detent.hosts.dcb274.ranges import FASTEST, SLOWEST, name_of_axis, ramp_seconds
+from detent.hosts.dcb274.single_mode import SingleMode
 from detent.hosts.errors import BadAnswer, Busy, MotionFailed, NoAnswer, Refused, Spoken
 from detent.hosts.exchange import Rest, Steps, operation, until
 

@@ -18,6 +18,10 @@ class OtherRun(MachineError):
     """A log that is none of this plan; nothing goes on from it."""
 
 
+class NothingToShip(MachineError):
+    """The trials have come to their end without a setting to ship: nothing goes on from their log either."""
+
+
 MISHAPS = 3  # broken trials in a row that are made again
 TRIALS, CONFIRM = 3, 59
 
@@ -91,7 +95,7 @@ class Result:
 def replayed(plan: Plan, bench: Bench, past: Iterable[Record]) -> tuple[Recipe, Trial | Found, int, int]:
     """The recipe with the trials of a log in it: itself, what comes next, how many trials there were, and losses.
 
-    OtherRun where the log is not that of this plan.
+    OtherRun where the log is not that of this plan, NothingToShip where that has ended so.
     """
     made = plan.recipe(bench)
     records = iter(past)
@@ -118,7 +122,7 @@ def _sent(made: Recipe, lost: bool) -> Trial | Found:
         found: Found = end.value
         return found
     except RecipeError as error:
-        raise MachineError(str(error)) from None
+        raise NothingToShip(str(error)) from None
 
 
 def _same(there: Record, here: Record) -> None:
