@@ -231,3 +231,36 @@ def test_a_switch_of_the_machine_is_at_a_wired_input_of_a_driven_axis(old: str, 
 def test_without_a_board_there_is_no_switch_of_the_machine() -> None:
     with pytest.raises(Problem, match=r"switches\.end\.axis: no axis is driven; without machine = true"):
         cell(GOOD[: GOOD.index("[boards")] + END)
+
+
+@pytest.mark.parametrize(
+    ("unit", "pin"),
+    [
+        ('model = "dcb-274"', "STEP"),
+        ('model = "dcb-274"', "DIR"),
+        ('model = "dcb-274"\noptions = { inputs = "encoder" }', "STEP"),
+        ('model = "bs0610"\noptions = { e_mode = 1 }', "X+"),
+    ],
+)
+def test_an_input_on_which_every_pulse_counts_is_refused(unit: str, pin: str) -> None:
+    """A board would miss pulses without a word, and nobody would know where the motor stands."""
+    text = f"""
+[units.x]
+{unit}
+[boards.b]
+serial = "fake:"
+[hardware.x]
+board = "b"
+inputs = {{ "{pin}" = "^gpio10" }}
+"""
+    with pytest.raises(Problem) as raised:
+        cell(text)
+    wanted = (
+        f"cell.toml: hardware.x.inputs.{pin}: every pulse on x.{pin} is a step, and a board looks at its inputs once"
+    )
+    assert str(raised.value).startswith(wanted)
+    assert str(raised.value).endswith("or let a unit of this cell give them")
+
+
+def test_slew_keys_are_inputs_like_others() -> None:
+    cell(GOOD.replace('RST = "^gpio30"', 'RST = "^gpio30", "X+" = "^gpio31"'))

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
 
 DRIVERS_SHARE = ("driver.uart", "driver.transmit", "driver.clock", "driver.mosi", "driver.miso")
 HOLD = "8 ms"  # what a look at a pin and back takes, about
+STEPS_LOST = (
+    "and a board looks at its inputs once a millisecond: steps would be lost; leave it out, and give the pulses to the "
+    "driver itself, or let a unit of this cell give them"
+)
 
 
 class Joined(NamedTuple):
@@ -149,6 +153,8 @@ def _check_input(
     inputs = [found.name for found in controller.pins if found.kind.reads]
     if pin not in inputs:
         raise problem(f"inputs.{pin}", str(catalogue.unknown(f"input of {unit}", pin, inputs)))
+    if pin in controller.step_inputs():
+        raise problem(f"inputs.{pin}", f"every pulse on {unit}.{pin} is a step, {STEPS_LOST}")
     if joined.drivers:
         what = f"{unit}.{pin} is on a wire from {joined.drivers[0]} in this cell already: remove one of them"
         raise problem(f"inputs.{pin}", what)

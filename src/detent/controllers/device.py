@@ -255,6 +255,9 @@ class Controller(Device, Protocol):
     def switches(self, axis: str = "") -> Sequence[str]:
         """The inputs for the switches on the way of an axis: ends of travel, limits, home."""
 
+    def step_inputs(self) -> Sequence[str]:
+        """The inputs on which every pulse counts, as they are meant now: each is a step, or a phase of an encoder."""
+
     def frame(self, text: str) -> bytes:
         """The bytes a host sends for the command line `text`: address, checksum and terminator added.
 

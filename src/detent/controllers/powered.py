@@ -60,6 +60,10 @@ class PoweredDevice(ABC):
         self._out.clear()
         return out
 
+    def step_inputs(self) -> Sequence[str]:
+        """The inputs on which every pulse counts, as they are meant now."""
+        return ()
+
     @property
     def straps(self) -> Mapping[str, Level]:
         """How its straps are tied now; what counts is how they were when they were read."""

@@ -372,3 +372,17 @@ def test_the_master_of_time_may_come_back() -> None:
         bench.rest()
         assert (bench.position("x"), bench.position("y")) == (30, 30)
         assert not [news for news in bench.news if "slipped" in news.text]
+
+
+def test_pulses_on_pins_that_become_steps_are_warned_of() -> None:
+    """E mode, chosen by a host: pulses that a board does not see would be steps that nobody misses."""
+    with Bench(TWO) as bench:
+        bench.run(400 * MS)
+        assert bench.news == []
+        for text in (b"1E", b"0E", b"2E"):
+            bench.send("t", text)
+            bench.run(200 * MS)
+        warning = (
+            "t: on Y+ every pulse is a step now, and a board looks at its inputs once a millisecond: steps may be lost"
+        )
+        assert [news.text for news in bench.news] == [warning] * 2

@@ -280,6 +280,10 @@ class Dcb274(OneAxis):
         """Both limits and home."""
         return ("LIMIT-A", "LIMIT-B", "HOME")
 
+    def step_inputs(self) -> Sequence[str]:
+        """Step and direction, or the phases of an encoder."""
+        return ("STEP", "DIR")
+
     def drive(self, now: Ns) -> current.Drive:
         """Current, decay and step table, as the drive has them at `now`: data for a motor model."""
         return current.drive(self._motion, self._settings, self._axis.shaft_at(now), now)

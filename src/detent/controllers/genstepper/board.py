@@ -212,6 +212,10 @@ class Board(PoweredDevice):
         axis = axis or AXES[0]
         return (f"L{axis}-", f"L{axis}+")
 
+    def step_inputs(self) -> Sequence[str]:
+        """The slew inputs in E mode; without supply, those of a board that begins with it."""
+        return pins.SLEWS if self._direct.on or (self._order.e_mode and self._phase is not Phase.READY) else ()
+
     def halt(self, now: Ns) -> None:
         """Both motors stop at once. A slew key that is held then counts again when it has been let go."""
         self.advance(now)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from detent.realtime.boards.events import Stopped
 from detent.realtime.boards.failures import Failures
-from detent.realtime.boards.states import AxisState, BoardState, Standing
+from detent.realtime.boards.states import AxisState, BoardState, Standing, Weight
 from detent.ticks import MS, NEVER, Ns
 from detent.uart import Chars
 
@@ -118,6 +118,7 @@ class Driven(Failures):
         self._currents()
         self._not_stopped()
         self._prove()
+        self._warn_of_step_inputs()
         if self._stores.first < NEVER:
             self._stores.flush(self._horizon())
         if self.cell.now >= self._forgotten + FORGET_EVERY:
@@ -137,6 +138,15 @@ class Driven(Failures):
                 if sent != here and not self._pending:
                     self._fault(ledger, f"{sent} steps were sent where the cell has {here}")
                     self._place(ledger, sent)
+
+    def _warn_of_step_inputs(self) -> None:
+        """Say it where pulses on inputs with pins become steps: a board that looks at them now and then misses some."""
+        for unit in {unit for unit, _ in self.plan.inputs.values()}:
+            pins = [pin for pin in self.cell.controller(unit).step_inputs() if (unit, pin) in self._input_of]
+            if pins and unit not in self._stepped_by_pins:
+                what = "every pulse is a step now, and a board looks at its inputs once a millisecond"
+                self._say(Weight.WARNING, f"{unit}: on {', '.join(pins)} {what}: steps may be lost")
+            (self._stepped_by_pins.add if pins else self._stepped_by_pins.discard)(unit)
 
     def _forget(self) -> None:
         self._forgotten = self.cell.now

@@ -98,6 +98,7 @@ class Outgoing:
         self.on_moving: Callable[[bool], None] = lambda moving: None  # something begins to move, or all is at rest
         self.on_taken_back: Callable[[Ns], None] = lambda at: None  # what the cell did behind `at` did not happen
         self._was_moving = False
+        self._stepped_by_pins: set[str] = set()  # units that are stepped by pulses on inputs with pins
         self.abandoned = False  # the cell cannot go on, and so nothing is done for it any more
         self.cut_short: frozenset[str] = frozenset()  # axes that moved when the end came
         self._over: WallNs | None = None  # since when their last steps have left
