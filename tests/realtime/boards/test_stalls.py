@@ -177,6 +177,13 @@ def test_a_stall_within_a_write_is_a_slip_too(part: int) -> None:
     assert sum(session(seed, writes=True)[0] for seed in range(30 + 8 * part, 38 + 8 * part)) > 3
 
 
+@pytest.mark.parametrize("delay", [20 * MS, 90 * MS])
+def test_a_slow_wire_is_no_dead_board(delay: int) -> None:
+    """A computer that boots gives the wire its turn late: while something comes, it is waited for."""
+    with Bench(GS, port={"delay": delay}) as bench:
+        assert bench.boards.ready
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("writes", [False, True])
 def test_a_stall_anywhere_is_a_slip_in_many_sessions(writes: bool) -> None:

@@ -23,7 +23,7 @@ from detent.realtime.pace import WallNs
 from detent.ticks import MS, SECOND, Ns
 
 PIECE = 40  # bytes of the dictionary in one answer
-NO_ANSWER: WallNs = 5 * SECOND  # at the start
+NO_ANSWER: WallNs = 5 * SECOND  # at the start, while nothing comes
 RUNS = (1 << 30, 8, 2, 1, 1)  # of steps, at most: a batch that has gone stale is made anew, and shorter
 DYING: WallNs = 700 * MS  # what a host before us has queued is over by then
 
@@ -71,7 +71,7 @@ class Board:
         self._fresh = False  # it had to be configured
         self._was_down = False  # it was found shut down, with its outputs at `off`
         self._known = False  # it was ready once, so that positions mean something
-        self._begin_at: WallNs = 0
+        self._heard_at: WallNs = 0  # something of it, or it was started
         self._wait_until: WallNs | None = None
         self._identity = bytearray()
         self._setting: Iterator[frozenset[str]] | None = None  # its configuration, as far as it has yet to be sent
@@ -128,7 +128,7 @@ class Board:
         core.forget_questions()
         self.state = State.CONNECTING
         self._identity.clear()
-        self._begin_at = wall
+        self._heard_at = wall
         self._wait_until = self._setting = None
         self._probes.clear()
         self.wants_reopening = False
@@ -146,6 +146,7 @@ class Board:
         was = core.link.synced
         for said in core.link.receive(data, wall):
             core.known = said.known
+            self._heard_at = wall
             try:
                 messages = core.dictionary.parse(said.payload)
             except FrameError:
@@ -167,7 +168,7 @@ class Board:
             return None
         times = [self.core.link.deadline(), self.core.deadline(), self._wait_until, self._probes.at]
         if self.state is State.CONNECTING:
-            times.append(self._begin_at + NO_ANSWER)
+            times.append(self._heard_at + NO_ANSWER)
         if self.state is State.READY:
             times += self._equipment.deadlines()
         return min((at for at in times if at is not None), default=None)
@@ -178,7 +179,7 @@ class Board:
             return
         core = self.core
         core.link.due(wall)
-        if self.state is State.CONNECTING and wall >= self._begin_at + NO_ANSWER:
+        if self.state is State.CONNECTING and wall >= self._heard_at + NO_ANSWER:
             self._refuse("", "", "it does not answer as a board with Klipper firmware; look at its address and its "
                          "cable, and that the firmware is flashed for this interface", passing=True)  # fmt: skip
             return
@@ -419,7 +420,7 @@ class Board:
         if self.state is State.SHUT_DOWN:
             self._recovering = True
             self.state = State.CONFIGURING
-            self._ask_config(wall)
+            self._probes.again(wall, self._ask_config)  # the clocks may have parted meanwhile: a host was suspended
             self.core.link.flush(wall)
         elif self.state in (State.LOST, State.REFUSED, State.IDLE):
             self._recovering = self._known

@@ -4,6 +4,11 @@ Asked at `sent`, answered at `received`, the board read its clock somewhere betw
 straight line through the quicker half of the last ones, old and new alike, says where the clock stands and how fast it
 runs. Until two seconds have been seen its nominal frequency counts. 32 bits come back; they are extended to the nearest
 whole count.
+
+Two clocks may part: that of a process that is kept from running stands, or that of a host that is suspended. What was
+seen before then says nothing any more. So each round trip is held against the one before: a crystal makes so many ticks
+from one to the other, as far as they tell. One that does not fit is put aside, as it may be its own times that are
+wrong; if the next one does not fit either, the estimate begins anew with that.
 """
 
 from collections import deque
@@ -11,11 +16,14 @@ from math import ceil, floor
 from typing import NamedTuple
 
 from detent.realtime.pace import WallNs
-from detent.ticks import SECOND, Ns
+from detent.ticks import SECOND, US, Ns
 
 KEPT = 32  # round trips
 GROUP = 4
 SEEN: WallNs = 2 * SECOND  # from which on the slope is measured
+APART: WallNs = 500 * US  # what two round trips may differ by beyond what their lengths say
+UNMEASURED = 100  # by a hundredth of its frequency may a board run faster or slower, as far as that is not known
+MEASURED = 2000  # and by so much less, behind that
 WRAP = 1 << 32
 
 
@@ -35,6 +43,8 @@ class Clock:
         self._tick = 0.0
         self._whole = 0  # ticks, apart from the fraction: floats keep 2**-20 of a tick so
         self._rate = frequency / SECOND
+        self._measured = False  # the rate was, and is not what the board says
+        self._doubted = False  # the last round trip did not fit
         self._told: Ns = 0
 
     @property
@@ -51,9 +61,29 @@ class Clock:
         """The whole count whose low 32 bits are `low` and which is nearest to the estimate at `wall`."""
         return nearest(low, self.tick_at(wall))
 
-    def note(self, tick: int, sent: WallNs, received: WallNs) -> None:
-        """A round trip; `tick` is a whole count."""
-        self.trips.append(_Trip((sent + received) // 2, received - sent, tick))
+    def note(self, tick: int, sent: WallNs, received: WallNs) -> bool:
+        """A round trip; `tick` is a whole count. False: it does not fit, and is put aside until the next does not."""
+        trip = _Trip((sent + received) // 2, received - sent, tick)
+        if self.trips and not self._fits(trip):
+            self._doubted = not self._doubted
+            if self._doubted:
+                return False
+            self.trips.clear()
+            self._rate, self._measured = self.frequency / SECOND, False
+        self._doubted = False
+        self.trips.append(trip)
+        self._draw()
+        return True
+
+    def _fits(self, trip: _Trip) -> bool:
+        """Whether a clock that was where the last round trip found it can be where this one does."""
+        last = self.trips[-1]
+        span = trip.middle - last.middle
+        slack = (trip.length + last.length) // 2 + APART + abs(span) // (MEASURED if self._measured else UNMEASURED)
+        return abs((trip.tick - last.tick) / self._rate - span) <= slack
+
+    def _draw(self) -> None:
+        """The line through what was seen."""
         # the quicker half of every few that follow each other: old ones and new ones alike
         trips = list(self.trips)
         groups = [sorted(trips[i : i + GROUP], key=lambda trip: trip.length) for i in range(0, len(trips), GROUP)]
@@ -69,6 +99,7 @@ class Clock:
             over = sum((w - mean_wall) ** 2 for w in walls)
             self._rate = sum((w - mean_wall) * (t - mean_tick) for w, t in zip(walls, ticks, strict=True)) / over
             self._tick = mean_tick - self._rate * mean_wall
+            self._measured = True
         else:
             self._tick = sum(t - self._rate * w for w, t in zip(walls, ticks, strict=True)) / n
 

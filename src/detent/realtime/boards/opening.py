@@ -22,6 +22,7 @@ from detent.realtime.pace import WallNs
 from detent.ticks import MS, SECOND, Ns
 
 PATIENCE: WallNs = 10 * SECOND
+MOST_PATIENCE: WallNs = 60 * SECOND  # with one that goes on answering, on a slow wire or a busy computer
 
 Sleep = Callable[[Sequence[int], Sequence[int], float], tuple[Sequence[int], Sequence[int]]]
 """Wait until a descriptor can be read or written, or some seconds have passed: those that can."""
@@ -82,13 +83,16 @@ def make_ready(
     Raises Problem where a board refuses, or does not answer in time.
     """
     levels: dict[str, Level] = {}
-    began = wall()
+    began = heard_at = wall()
+    heard = 0
     boards.start(began)
     while not boards.ready:
         now = wall()
-        if now - began > PATIENCE:
+        if boards.acknowledged != heard:
+            heard, heard_at = boards.acknowledged, now
+        if now - heard_at > PATIENCE or now - began > MOST_PATIENCE:
             late = next(name for name, board in boards.boards.items() if board.state.value != "ready")
-            what = f"the board does not answer as one with Klipper firmware would, for {PATIENCE // SECOND} s"
+            what = f"the board does not answer as one with Klipper firmware would, for {(now - began) // SECOND} s"
             raise NotYet(plan.file, f"boards.{late}.serial", f"{what}: look with detent boards")
         turn(boards, wall, sleep)
         for event in boards.events():

@@ -31,6 +31,11 @@ class Probes:
         self._then = then
         self._core.ask("get_uptime", "uptime", self._uptime, wall)
 
+    def again(self, wall: WallNs, then: Callable[[WallNs], None]) -> None:
+        """Ask a few times more; `then` it is known where the clock stands, whatever happened meanwhile."""
+        self._then, self._left = then, FIRST
+        self.ask(wall)
+
     def _uptime(self, message: Message, wall: WallNs) -> None:
         whole = (message.number("high") & 0xFFFFFFFF) << 32 | message.number("clock") & 0xFFFFFFFF
         self._core.clock.note(whole, wall, wall)
@@ -53,9 +58,10 @@ class Probes:
     def _clocked(self, message: Message, wall: WallNs) -> None:
         core = self._core
         tick = core.whole(message, "clock", wall)
-        if self._sent is not None and self._sent[1] == core.link.retransmitted:
-            core.clock.note(tick, self._sent[0], wall)
-        if self._left:
+        undisturbed = self._sent is not None and self._sent[1] == core.link.retransmitted
+        if self._sent is not None and undisturbed and not core.clock.note(tick, self._sent[0], wall):
+            self.ask(wall)  # the next one says which of them was wrong
+        elif self._left:
             self._left -= 1
             if self._left:
                 self.ask(wall)

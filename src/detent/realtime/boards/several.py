@@ -290,6 +290,11 @@ class Boards:
             self._pump(board, port, wall)
 
     @property
+    def acknowledged(self) -> int:
+        """Messages that boards have taken since they were started."""
+        return sum(board.core.link.acknowledged for board, _ in self._pairs)
+
+    @property
     def quiet(self) -> bool:
         """Whether every board that is there has acknowledged what it was sent."""
         return all(board.core.link.idle for board, _ in self._pairs if not board.still)

@@ -1,0 +1,100 @@
+"""Two clocks that part: the board's stands now and then, or goes on while the host's stands (a computer that slept).
+
+No crystal does that; a board that is a process on a busy computer does, and so does a host that is suspended. What
+was known of the clock is wrong then, and a line through what was seen before and behind would be wrong for long.
+"""
+
+from random import Random
+
+import pytest
+from tests.realtime.boards.driven_bench import Bench
+from tests.realtime.boards.test_stalls import GS
+
+from detent.realtime.boards.clock import Clock
+from detent.realtime.boards.states import Standing
+from detent.ticks import MS, SECOND, US, Ns
+
+FREQUENCY = 16_000_000
+
+
+@pytest.mark.parametrize("drift", [-5000, -40, 0, 100, 5000])
+@pytest.mark.parametrize("jump", [-30 * SECOND, -20 * MS, 20 * MS, 30 * SECOND])
+def test_a_jump_is_known_behind_two_round_trips(jump: Ns, drift: int) -> None:
+    random = Random(jump)
+    clock, wall, off = Clock(FREQUENCY), 0, 0
+
+    def true(at: Ns) -> int:
+        return (at + off) * FREQUENCY * (1_000_000 + drift) // (1_000_000 * SECOND)
+
+    def trip(at: Ns) -> bool:
+        there, back = random.randrange(60, 200) * US, random.randrange(60, 300) * US
+        return clock.note(true(at + there), at, at + there + back)
+
+    for second in range(40):
+        fits = trip(wall)
+        assert fits is (second != 20)
+        if not fits:
+            wall += 1 * MS
+            assert trip(wall)
+        if second > 29 or 9 < second < 20:
+            for ahead in (0, SECOND):
+                assert abs(clock.tick_at(wall + ahead) - true(wall + ahead)) < 300 * US * FREQUENCY // SECOND
+        elif second == 20:
+            assert abs(clock.tick_at(wall) - true(wall)) < 200 * US * FREQUENCY // SECOND
+        wall += 985 * MS
+        off += jump if second == 19 else 0
+
+
+def test_one_answer_that_does_not_fit_is_not_believed() -> None:
+    """A host that was kept away between its clock and the wire has the wrong time of one round trip."""
+    clock = Clock(FREQUENCY)
+    for second in range(10):
+        clock.note(FREQUENCY * second + 1600, second * SECOND, second * SECOND + 200 * US)
+    before = clock.tick_at(20 * SECOND)
+    assert not clock.note(FREQUENCY * 10 + 800_000, 10 * SECOND, 10 * SECOND + 200 * US)
+    assert clock.tick_at(20 * SECOND) == before
+    assert clock.note(FREQUENCY * 10 + 17_600, 10 * SECOND + MS, 10 * SECOND + MS + 200 * US)
+    assert abs(clock.tick_at(20 * SECOND) - before) < 100 * US * FREQUENCY // SECOND
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_board_whose_clock_stands_now_and_then_never_shuts_down(seed: int) -> None:
+    """As the firmware's process does where it is kept from running and its clock with it; then it runs freely."""
+    random = Random(seed)
+    with Bench(GS, jitter=lambda: random.randrange(200 * US)) as bench:
+        bench.run(100 * MS)
+        port = bench.ports["b"]
+        for stands in (True, False):
+            end = bench.wall + 5 * SECOND
+            bench.type("x", f"T{random.randrange(300, 3000)}")
+            while bench.wall < end:
+                bench.type("x", random.choice(("+{n}", "-{n}", "Z", "A1", "C1")).format(n=random.randrange(1, 500)))
+                bench.run(random.randrange(400 * MS))
+                if stands and random.random() < 0.9:
+                    port.stand(random.randrange(12 * MS))
+            assert port.board.reason is None, port.board.gave_up_at
+        bench.rest()
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.DRIVEN
+        assert state.shaft == bench.position("x")
+
+
+@pytest.mark.parametrize("slept", [3 * SECOND, 100 * SECOND, 3600 * SECOND])
+def test_a_computer_that_slept_recovers_at_the_first_time(slept: Ns) -> None:
+    """Its own clock has stood, and the board's has gone on."""
+    with Bench(GS) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+3000")
+        bench.run(700 * MS)
+        bench.ports["b"].stand(-slept)
+        bench.run(300 * MS)
+        assert bench.driven.axes()[0].standing is Standing.FAULT
+        bench.driven.recover()
+        bench.run(100 * MS)
+        assert bench.driven.axes()[0].standing is Standing.DRIVEN
+        bench.type("x", "+100")
+        bench.run(3 * SECOND)
+        bench.rest()
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.DRIVEN, state.why
+        assert state.shaft == bench.position("x")
