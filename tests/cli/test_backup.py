@@ -163,7 +163,7 @@ def test_a_restore_that_is_interrupted_names_both_files_and_can_be_done_again(
         assert f"detent restore gs-c200s {address(service)} {kept} what it held before" in err
         # the module is still in programming mode, where X is "not allowed" (E4)
         run("restore", "gs-c200s", address(service), kept, "--yes")
-        run("backup", "gs-c200s", address(service), file, "--force")
+        run("backup", "gs-c200s", address(service), file, "--overwrite")
     assert Backup.parse(file.read_text()).saved["program"] == ["C1"]
     assert "ram" not in Backup.parse(file.read_text()).saved
 
@@ -231,11 +231,11 @@ def test_a_second_backup_keeps_the_first_and_both_say_how_they_go_back(
         run("backup", *unit, "--json")
         out, err = capsys.readouterr()
         assert file.read_text() == "mine"
-        assert f"{file} is there and is kept; --force writes over it" in err
+        assert f"{file} is there and is kept; --overwrite writes over it" in err
         assert json.loads(out.splitlines()[-1])["file"] == str(tmp_path / "unit-3.toml")
         text = (tmp_path / "unit-2.toml").read_text()
         assert "detent restore gs-c200 PORT FILE --no-checksum --baud 9600\n" in text
-        run("backup", *unit, "--force")
+        run("backup", *unit, "--overwrite")
     assert Backup.parse(file.read_text()).model == "gs-c200"
     assert sorted(path.name for path in tmp_path.glob("unit*")) == ["unit-2.toml", "unit-3.toml", "unit.toml"]
 

@@ -95,7 +95,7 @@ restore gs-c200 {port} {folder} --yes | cannot read it
 upload gs-c200 {port} {missing}.src | No such file
 upload gs-c200 {port} {text}.toml | takes a direction
 upload supersigma {port} {text}.toml |
-download gs-c200 {port} {text}.toml | over it with --force
+download gs-c200 {port} {text}.toml | over it with --overwrite
 download gs-c20 {port} | did you mean gs-c200
 download gs-c200 {port} --output {long} | too long
 find \x01 | \\x01

@@ -5,21 +5,21 @@ from pathlib import Path
 
 import pytest
 
-from detent.cli import VERBS, main
+from detent.cli import VERBS, application, main
 
 MINE = "mine\n"
 
 # The verb and what it writes, a line that writes it to {out}, and how it is asked to write over what is there.
 OUTPUTS = {
-    ("demo", "output"): ("demo menu --output {folder}", "--force"),
-    ("run", "plot"): ("run gs-c200 --plot {out}.png", "--force"),
-    ("run", "vcd"): ("run gs-c200 --vcd {out}.vcd", "--force"),
-    ("run", "sr"): ("run gs-c200 --for 1ms --sr {out}.sr", "--force"),
-    ("run", "npz"): ("run gs-c200 --npz {out}.npz", "--force"),
-    ("run", "steps"): ("run gs-c200 --steps {out}.csv", "--force"),
-    ("service", "output"): ("service {cell} --output {out}", "--force"),
-    ("asm", "output"): ("asm gs-c200 {source} --output {out}", "--force"),
-    ("disasm", "output"): ("disasm gs-c200 {image} --output {out}", "--force"),
+    ("demo", "output"): ("demo menu --output {folder}", "--overwrite"),
+    ("run", "plot"): ("run gs-c200 --plot {out}.png", "--overwrite"),
+    ("run", "vcd"): ("run gs-c200 --vcd {out}.vcd", "--overwrite"),
+    ("run", "sr"): ("run gs-c200 --for 1ms --sr {out}.sr", "--overwrite"),
+    ("run", "npz"): ("run gs-c200 --npz {out}.npz", "--overwrite"),
+    ("run", "steps"): ("run gs-c200 --steps {out}.csv", "--overwrite"),
+    ("service", "output"): ("service {cell} --output {out}", "--overwrite"),
+    ("asm", "output"): ("asm gs-c200 {source} --output {out}", "--overwrite"),
+    ("disasm", "output"): ("disasm gs-c200 {image} --output {out}", "--overwrite"),
     ("download", "output"): ("download gs-c200 /dev/no-such-port --output {out}", ""),
     ("download", "file"): ("download gs-c200 /dev/no-such-port {out}", ""),
     ("motor", "plot"): ("motor qsh4218-41-10-035 --supply 24 --plot {out}.png", "--overwrite"),
@@ -27,11 +27,11 @@ OUTPUTS = {
         "compare-moves gs-c200 S=1 S=2 --motor qsh4218-41-10-035 --moves 10 --supply 24 --plot {out}.png", ""),
     ("tune", "map_"): ("tune gs-c200 --motor qsh4218-41-10-035 --supply 24 --moves 200 --map {out}.csv", ""),
     ("tune", "into"): ("tune gs-c200 --motor qsh4218-41-10-035 --supply 24 --moves 200 --into {out}", ""),
-    ("table", "bin_"): ("table --bin {out}", "--force"),
-    ("table", "hex_"): ("table --hex {out}", "--force"),
-    ("table", "text"): ("table --text {out}", "--force"),
+    ("table", "bin_"): ("table --bin {out}", "--overwrite"),
+    ("table", "hex_"): ("table --hex {out}", "--overwrite"),
+    ("table", "text"): ("table --text {out}", "--overwrite"),
     ("examples", "folder"): ("examples copy menu {out}", ""),
-    ("--install-completion", "output"): ("--install-completion --shell bash --output {out}", "--force"),
+    ("--install-completion", "output"): ("--install-completion --shell bash --output {out}", "--overwrite"),
 }  # fmt: skip
 
 # Files that are read, or, for a backup, get a number where one is there (test_backup).
@@ -97,12 +97,12 @@ def test_what_a_run_has_made_makes_room_for_a_newer_one(names: dict[str, Path]) 
 
 
 @pytest.mark.parametrize("words", [
-    "table {source} --hex {source} --force",
-    "asm gs-c200 {source} --output {source} --force",
-    "disasm gs-c200 {image} --output {image} --force",
-    "run {cell} --vcd {cell} --force",
-    "service {cell} --output {cell} --force",
-    "table --bin {out} --hex {out} --force",
+    "table {source} --hex {source} --overwrite",
+    "asm gs-c200 {source} --output {source} --overwrite",
+    "disasm gs-c200 {image} --output {image} --overwrite",
+    "run {cell} --vcd {cell} --overwrite",
+    "service {cell} --output {cell} --overwrite",
+    "table --bin {out} --hex {out} --overwrite",
     "run gs-c200 --vcd {out} --npz {out}",
 ])  # fmt: skip
 def test_what_is_read_is_never_written_over_and_two_outputs_have_two_files(
@@ -130,10 +130,10 @@ OWN = "motor {own} --move 200 --supply 24 --overwrite --plot {read}.png"
             for one in ("--curve", "--load-by", "--ring-down")
         ),
         OWN,
-        "service {cell} --force --output {read}",
-        "run {cell} --force --vcd {read}",
-        "run gs-c200 --program {read} --force --vcd {read}",
-        "table --curve {read} --low 800 --high 9000 --force --hex {read}",
+        "service {cell} --overwrite --output {read}",
+        "run {cell} --overwrite --vcd {read}",
+        "run gs-c200 --program {read} --overwrite --vcd {read}",
+        "table --curve {read} --low 800 --high 9000 --overwrite --hex {read}",
     ],
 )
 def test_whatever_a_verb_reads_it_does_not_write_over_even_if_it_is_asked_to(
@@ -152,6 +152,16 @@ def test_whatever_a_verb_reads_it_does_not_write_over_even_if_it_is_asked_to(
     assert main_quietly(*(word.format(**names) for word in line.replace("{read}" + suffix, "{read}").split())) == 2
     assert "is read here, and would be lost" in capsys.readouterr().err
     assert read.read_bytes() == before
+
+
+@pytest.mark.parametrize("verb", sorted({verb for verb, _ in OUTPUTS if verb in VERBS} - {"examples"}))
+def test_every_verb_that_writes_is_asked_by_the_same_word(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """And says so to who takes another, which is a force in N where a load has one."""
+    names = {name for argument in application(verb)[verb].assemble_argument_collection() for name in argument.names}
+    assert "--overwrite" in names
+    first = next(line for (name, _), (line, _) in OUTPUTS.items() if name == verb)
+    assert main_quietly(*first.split(), "--force") == 2
+    assert "--overwrite" in capsys.readouterr().err
 
 
 def test_every_file_that_a_verb_is_given_is_in_the_table() -> None:

@@ -48,10 +48,10 @@ def test_a_download_replaces_nothing_unasked(tmp_path: Path, capsys: pytest.Capt
     run("download", "gs-c200s", "PORT", kept, status=2)
     run("download", "gs-c200s", "PORT", kept, "--output", new, status=2)
     assert kept.read_text() == "mine"
-    assert "is there: write to another file, or over it with --force" in capsys.readouterr().err
+    assert "is there: write to another file, or over it with --overwrite" in capsys.readouterr().err
     with served("gs-c200s") as service:
         run("download", "gs-c200s", address(service), "--output", new)
-        run("download", "gs-c200s", address(service), "--output", kept, "--force")
+        run("download", "gs-c200s", address(service), "--output", kept, "--overwrite")
     assert kept.read_text() == new.read_text() != "mine"
 
 

@@ -146,7 +146,7 @@ def test_steps_that_cannot_be_written_leave_the_file_alone(
 ) -> None:
     file = tmp_path / "out.csv"
     file.write_text("mine\n")
-    assert detent("run", "gs-c200", "--send", "+100", "--steps", str(file), "--force", *words) == 2
+    assert detent("run", "gs-c200", "--send", "+100", "--steps", str(file), "--overwrite", *words) == 2
     assert said in " ".join(capsys.readouterr().err.replace("\u2502", " ").split())
     assert file.read_text() == "mine\n"
     assert list(tmp_path.iterdir()) == [file]
@@ -399,9 +399,9 @@ def test_an_output_replaces_what_a_run_has_made_and_nothing_else_unasked(
     file = tmp_path / ("out.svg" if kind == "plot" else "out")
     file.write_text("mine")
     assert detent("run", "gs-c200", f"--{kind}", str(file)) == 2
-    assert "is there: write to another file, or over it with --force" in capsys.readouterr().err
+    assert "is there: write to another file, or over it with --overwrite" in capsys.readouterr().err
     assert file.read_text() == "mine"
-    assert detent("run", "gs-c200", f"--{kind}", str(file), "--force") == 0
+    assert detent("run", "gs-c200", f"--{kind}", str(file), "--overwrite") == 0
     assert detent("run", "gs-c200", f"--{kind}", str(file)) == 0
     if kind != "plot":
         assert detent("run", str(arm), f"--{kind}", str(arm)) == 2

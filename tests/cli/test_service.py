@@ -82,8 +82,8 @@ def test_a_file_is_never_written_over_unasked(cell: Path, tmp_path: Path, capsys
     place.write_text("mine")
     status, out, err = run(capsys, "service", str(cell), "--user", "a", "--output", str(place))
     assert (status, out, place.read_text()) == (2, "", "mine")
-    assert "is there: write to another file, or over it with --force" in err
-    status, out, _ = run(capsys, "service", str(cell), "--user", "a", "--output", str(place), "--force")
+    assert "is there: write to another file, or over it with --overwrite" in err
+    status, out, _ = run(capsys, "service", str(cell), "--user", "a", "--output", str(place), "--overwrite")
     assert status == 0
     assert "sudo systemctl enable --now detent-pico-gs-c200" in out
     assert place.read_text().startswith("# Made by `detent service pico-gs-c200.toml`")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from detent.cli.codes import FAILED
 
 if TYPE_CHECKING:
-    from cyclopts import App
+    from cyclopts import App, CycloptsError
 
 TITLE = "Intelligent stepper motor controllers in software, exact to the pulse."
 COMPLETION = "Write the script that completes detent in your shell."
@@ -111,8 +111,7 @@ def main(tokens: Sequence[str] | None = None) -> None:
         application(given[0] if given else "")(given)
     except CycloptsError as error:
         verb = given[0] if given and given[0] in VERBS else ""
-        told = " ".join(str(error).split()) or "this cannot be read"
-        endings.asked_wrongly(f"{told} See: detent {verb} --help".replace("  ", " "))
+        endings.asked_wrongly(f"{_told(error, given)} See: detent {verb} --help".replace("  ", " "))
     except MissingExtra as error:
         endings.asked_wrongly(error)
     except BrokenPipeError:
@@ -124,6 +123,23 @@ def main(tokens: Sequence[str] | None = None) -> None:
     finally:
         for ending, handler in before.items():
             signal.signal(ending, handler)
+
+
+def _told(error: "CycloptsError", given: Sequence[str]) -> str:
+    """What is wrong with a command line, in one sentence.
+
+    Many programs call `--force` what is `--overwrite` here, where a load may have a force.
+    """
+    from cyclopts import UnknownOptionError
+
+    told = " ".join(str(error).split()) or "this cannot be read"
+    if "--force" not in told or not any(word.split("=")[0] == "--force" for word in given):
+        return told
+    if not isinstance(error, UnknownOptionError):
+        return f"{told} It is a force in N; to write over a file: --overwrite."
+    if any("--overwrite" in argument.names for argument in error.argument_collection):
+        return "Unknown option: --force. Did you mean --overwrite?"
+    return told
 
 
 def _nobody_reads() -> NoReturn:

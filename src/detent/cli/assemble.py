@@ -29,7 +29,7 @@ def asm(
     *,
     output: Path | None = None,
     format: Literal["image", "hex", "commands"] | None = None,
-    force: bool = False,
+    overwrite: bool = False,
     json: bool = False,
 ) -> None:
     """Assemble a program: labels and comments in, commands or an image out.
@@ -50,14 +50,14 @@ def asm(
     format
         What to write: the image as bytes (the default for a file), the image in hex, or the commands (the
         default for the terminal).
-    force
+    overwrite
         Write over a file that is there.
     json
         Print everything as JSON: commands, addresses, labels, image, bytes used.
     """
     if format == "image" and output is None:
         raise _asked_wrongly("an image is bytes and needs a file: add --output FILE, or choose --format hex")
-    _check_output(output, file, force)
+    _check_output(output, file, overwrite)
     assembly = _assembly(model, file, json)
     if output is not None:
         _write(output, _formatted(assembly, format or "image"))
@@ -89,7 +89,7 @@ def list_(model: str, file: Path, *, json: bool = False) -> None:
         print(listing(assembly), end="")
 
 
-def disasm(model: str, file: Path, *, output: Path | None = None, force: bool = False, json: bool = False) -> None:
+def disasm(model: str, file: Path, *, output: Path | None = None, overwrite: bool = False, json: bool = False) -> None:
     """Turn a program image back into source, with labels for its jumps.
 
     The EEPROM file of a unit that `serve` keeps is taken as well.
@@ -102,7 +102,7 @@ def disasm(model: str, file: Path, *, output: Path | None = None, force: bool = 
         The image that `asm` wrote, or an EEPROM file.
     output
         A file to write instead of the terminal, whole or not at all.
-    force
+    overwrite
         Write over a file that is there.
     json
         Print the source and its facts as JSON.
@@ -110,7 +110,7 @@ def disasm(model: str, file: Path, *, output: Path | None = None, force: bool = 
     from detent.realtime.images import ImageUnreadable, image_in
 
     language = _language(model)
-    _check_output(output, file, force)
+    _check_output(output, file, overwrite)
     try:
         image = image_in(_read(file), model)
         source = disassemble(language, image)
@@ -210,9 +210,9 @@ def _read(file: Path) -> bytes:
         raise _asked_wrongly(f"{file}: {error.strerror or error}") from error
 
 
-def _check_output(output: Path | None, file: Path, force: bool) -> None:
+def _check_output(output: Path | None, file: Path, overwrite: bool) -> None:
     try:
-        check_outputs([output], [file], asked=force)
+        check_outputs([output], [file], asked=overwrite)
     except InTheWay as error:
         raise _asked_wrongly(str(error)) from error
 

@@ -29,7 +29,7 @@ def backup(
     port: PortName,
     file: Path,
     *,
-    force: bool = False,
+    overwrite: bool = False,
     json: bool = False,
     unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:
@@ -42,7 +42,7 @@ def backup(
     ----------
     file
         The file to write, FILE.toml.
-    force
+    overwrite
         Write over a file that is there.
     json
         Print what was saved as JSON, too.
@@ -53,10 +53,10 @@ def backup(
     _keeps(model)
     with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:
         saved = _read(found, model, port)._replace(options=unit.written())
-    wanted, file = file, file if force else _free(file)
+    wanted, file = file, file if overwrite else _free(file)
     _write(file, saved)
     if wanted != file:
-        print(f"detent: {wanted} is there and is kept; --force writes over it", file=sys.stderr)
+        print(f"detent: {wanted} is there and is kept; --overwrite writes over it", file=sys.stderr)
     if json:
         print(json_text.dumps({"model": model, "port": port, "file": str(file), "saved": saved.saved}))
     else:

@@ -71,7 +71,7 @@ def compare_moves(
             raise ValueError(f'{len(settings)} settings: give two to {MOST}, each in quotes: "S=48 T=604 R=202"')
         if plot is not None:
             figures.check(plot)
-            check_outputs([plot], read_by(motor, rig), asked=overwrite, option="--overwrite")
+            check_outputs([plot], read_by(motor, rig), asked=overwrite)
         laws = [(text, *read(model, text.replace(";", " ").split())) for text in settings]
         windings = {winding_of(law, rig.step).name for _, law, _ in laws}
         if len(windings) > 1:

@@ -219,7 +219,7 @@ def without_others(script: str, shell: str) -> str:
 
 
 def install(
-    *, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path | None = None, force: bool = False
+    *, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path | None = None, overwrite: bool = False
 ) -> None:
     """Write the script that completes detent in your shell.
 
@@ -231,7 +231,7 @@ def install(
         Which shell; without it the one that runs.
     output
         Write the script to this file, and change nothing else.
-    force
+    overwrite
         Write over a file that is there.
     """
     from cyclopts.completion import detect_shell
@@ -241,7 +241,7 @@ def install(
     from detent.outputs.files import InTheWay, check_outputs, write_whole
 
     try:
-        check_outputs([output], asked=force)
+        check_outputs([output], asked=overwrite)
     except InTheWay as error:
         asked_wrongly(error)
     try:

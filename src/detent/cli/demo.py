@@ -17,7 +17,7 @@ LONGEST = 20  # seconds of the others: some of them run for ever
 
 
 def demo(
-    name: str = "drilling", *, output: Path = Path("detent-demo"), force: bool = False, json: bool = False
+    name: str = "drilling", *, output: Path = Path("detent-demo"), overwrite: bool = False, json: bool = False
 ) -> None:
     """Run an example cell, tell what happens, and draw it.
 
@@ -29,7 +29,7 @@ def demo(
         Which example.
     output
         The folder for the figure and the waveforms; made if it is not there.
-    force
+    overwrite
         Write over files there that no run has made.
     json
         Print the timeline and the result as JSON.
@@ -47,7 +47,7 @@ def demo(
     check(output / f"{name}.png")
     try:
         if output.is_dir():
-            check_outputs([output / f"{name}.png", output / f"{name}.vcd"], asked=force)
+            check_outputs([output / f"{name}.png", output / f"{name}.vcd"], asked=overwrite)
     except InTheWay as error:
         asked_wrongly(error)
     found = find_cell(str(place))

@@ -38,7 +38,7 @@ class ExportFiles(NamedTuple):
         """Those that are asked for."""
         return [path for path in (self.plot, self.vcd, self.sr, self.npz, self.steps) if path is not None]
 
-    def check(self, inputs: Sequence[Path], *, force: bool) -> None:
+    def check(self, inputs: Sequence[Path], *, overwrite: bool) -> None:
         """ValueError for files that cannot be written so, before anything is run."""
         from detent.outputs.files import check_outputs
 
@@ -52,7 +52,7 @@ class ExportFiles(NamedTuple):
         if self.frequency < 1:
             what = "a clock has 1 tick a second or more, like 12000000"
             raise ValueError(f"--steps-frequency {self.frequency}: {what}")
-        check_outputs(self.paths, inputs, asked=force)
+        check_outputs(self.paths, inputs, asked=overwrite)
 
 
 def write(cell: "Cell", source: "CellSource", files: ExportFiles) -> None:

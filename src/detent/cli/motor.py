@@ -96,7 +96,7 @@ def motor(
             from detent.outputs.files import check_outputs
 
             figures.check(plot)
-            check_outputs([plot], read_by(name, rig), asked=overwrite, option="--overwrite")
+            check_outputs([plot], read_by(name, rig), asked=overwrite)
         of_a_move = {
             "--as": as_, "--vary": vary, "--sensitivity": sensitivity or None, "--start": start, "--slew": slew,
             "--ramp": ramp, "--variants": variants,

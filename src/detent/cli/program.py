@@ -83,7 +83,7 @@ def download(
     file: Path | None = None,
     *,
     output: Path | None = None,
-    force: bool = False,
+    overwrite: bool = False,
     json: bool = False,
     unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:
@@ -95,7 +95,7 @@ def download(
         A file to write instead of the terminal, whole or not at all.
     output
         The same, for who is used to options.
-    force
+    overwrite
         Write over a file that is there.
     json
         Print source and lines as one line of JSON.
@@ -111,7 +111,7 @@ def download(
     file = output if file is None else file
     language = _language(model)
     try:
-        check_outputs([file], asked=force)
+        check_outputs([file], asked=overwrite)
     except InTheWay as error:
         asked_wrongly(error)
     with progress(f"reading the {model}") as watch, connected(model, port, unit, watch) as found:

@@ -30,7 +30,7 @@ def run(
     pin: Sequence[str] = (),
     line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
     allow_loss: Annotated[bool, Parameter(negative=())] = False,
-    force: Annotated[bool, Parameter(negative=())] = False,
+    overwrite: Annotated[bool, Parameter(negative=())] = False,
     json: bool = False,
 ) -> None:
     """Run a controller or a cell in virtual time and say where everything ended.
@@ -75,7 +75,7 @@ def run(
         Let characters take their time on the serial line.
     allow_loss
         Tell of a motor that loses steps, but do not fail because of it.
-    force
+    overwrite
         Write over files that no run has made.
     json
         Print the result as one line of JSON.
@@ -96,7 +96,7 @@ def run(
     try:
         found = find_cell(target, straps=strap, options=set_, programs=program, pins=pin)
         until = None if for_ is None else parse_duration(for_)
-        files.check(found.inputs, force=force)
+        files.check(found.inputs, overwrite=overwrite)
         cell = build(found.description, found.read, record=bool(files.paths), line_timing=line_timing,
                      typed=conversation.typed)  # fmt: skip
         observer = conversation.attend(cell, keeps=bool(files.paths))

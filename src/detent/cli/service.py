@@ -24,7 +24,7 @@ def service(
     user: str | None = None,
     control: str | None = None,
     output: Path | None = None,
-    force: Annotated[bool, Parameter(negative=())] = False,
+    overwrite: Annotated[bool, Parameter(negative=())] = False,
     json: bool = False,
 ) -> None:
     """Print a systemd unit that serves a cell from power-on.
@@ -47,7 +47,7 @@ def service(
         Listen on HOST:PORT for `detent control`, as `serve --control` does.
     output
         Write the unit to this file instead of printing it, and say what to do with it.
-    force
+    overwrite
         Write over a file that is there.
     json
         Print name, text and remarks as one line of JSON.
@@ -70,7 +70,7 @@ def service(
         who = user if user is not None else getpass.getuser()
         if not re.fullmatch(r"[a-z_][a-z0-9_-]*\$?", who):
             raise Problem("", "--user", f"{who!r} is no name of a user")
-        check_outputs([output], found.inputs, asked=force)
+        check_outputs([output], found.inputs, asked=overwrite)
     except ValueError as problem:
         asked_wrongly(problem)
     remarks = _remarks(found.description, who)

@@ -27,7 +27,7 @@ def table(
     bin_: Annotated[Path | None, Parameter(name="--bin")] = None,
     hex_: Annotated[Path | None, Parameter(name="--hex")] = None,
     text: Path | None = None,
-    force: bool = False,
+    overwrite: bool = False,
     option: bool = False,
     json: bool = False,
 ) -> None:
@@ -62,7 +62,7 @@ def table(
         Write them in Intel HEX.
     text
         Write a listing: t, V, N and the difference, entry by entry.
-    force
+    overwrite
         Write over files that are there.
     option
         Print only the line that the option `table` of the model supersigma takes.
@@ -75,7 +75,7 @@ def table(
     from detent.ramps.hex_records import intel_hex
 
     try:
-        check_outputs((bin_, hex_, text), [Path(curve)], asked=force)
+        check_outputs((bin_, hex_, text), [Path(curve)], asked=overwrite)
         clocks = _clocks(interval)
         wanted = {"peak": peak, "angular": angular, "phase": phase, "low": low, "high": high}
         law, seconds, name = _curve(curve, {key: value for key, value in wanted.items() if value is not None}, duration)

@@ -256,7 +256,7 @@ def _check(
     for path in maps:
         if path.suffix.lower() != ".csv":
             figures.check(path)
-    check_outputs(outputs, read, asked=overwrite, option="--overwrite")
+    check_outputs(outputs, read, asked=overwrite)
     if from_ is not None and not from_.is_file():
         raise ValueError(f"--from {from_}: there is no such file")
     if from_ is not None:

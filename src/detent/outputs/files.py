@@ -19,11 +19,11 @@ class InTheWay(ValueError):
 
 
 def check_outputs(
-    paths: Iterable[Path | None], inputs: Iterable[Path] = (), *, asked: bool = False, option: str = "--force"
+    paths: Iterable[Path | None], inputs: Iterable[Path] = (), *, asked: bool = False
 ) -> None:
     """The rule for every file that a verb writes; raises InTheWay before anything is done. None is no file.
 
-    No file takes the place of another unasked: `asked` says that this was asked for, by the `option`. What a run has
+    No file takes the place of another unasked: `asked` says that this was asked for, by --overwrite. What a run has
     drawn or recorded itself makes room for a newer one. Whatever is asked, what is read here is not written over, and
     two outputs do not go to one file.
     """
@@ -45,7 +45,7 @@ def check_outputs(
         if path.is_dir():
             raise InTheWay(f"{path}: cannot write it: it is a folder; name a file in it")
         if path.is_file() and not asked and not _is_ours(path):
-            raise InTheWay(f"{path} is there: write to another file, or over it with {option}")
+            raise InTheWay(f"{path} is there: write to another file, or over it with --overwrite")
 
 
 def _is_ours(path: Path) -> bool:
