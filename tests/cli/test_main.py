@@ -1,5 +1,7 @@
 """The command as a whole: help, exit status, what it says to a wrong call."""
 
+import re
+import shlex
 import subprocess
 import sys
 from importlib import import_module
@@ -40,6 +42,19 @@ def test_every_parameter_of_a_verb_has_help(name: str) -> None:
     assert len(parameters)
     without = [each.names for each in parameters if each.names != ("*",) and not each.parameter.help]
     assert not without
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_the_help_of_a_verb_has_an_example_that_can_be_typed(name: str) -> None:
+    place, _ = VERBS[name]
+    module, function = place.split(":")
+    doc = getdoc(getattr(import_module(module), function)) or ""
+    examples = [shlex.split(words) for words in re.findall(r"(?:For example|Or):\s+`detent ([^`]*)`", doc)]
+    assert examples
+    for verb, *words in examples:
+        assert verb == name
+        application(verb)[verb].parse_args(words, exit_on_error=False, print_error=False)
+    assert {words.split()[1] for words in re.findall(r"`(detent [^`]*)`", doc)} <= set(VERBS)
 
 
 def test_a_wrong_call_exits_with_2_and_names_the_verb_that_was_meant(capsys: pytest.CaptureFixture[str]) -> None:

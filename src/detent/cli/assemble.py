@@ -39,6 +39,8 @@ def asm(
     controller's programs have places, with the lines that say where each part stands. An image begins at the first
     address of the program memory.
 
+    For example: `detent asm gs-c200 drill.gsc --output drill.img`
+
     Parameters
     ----------
     model
@@ -73,6 +75,8 @@ def asm(
 def list_(model: str, file: Path, *, json: bool = False) -> None:
     """List a program source with the address and bytes of every instruction.
 
+    For example: `detent list gs-c200 drill.gsc`
+
     Parameters
     ----------
     model
@@ -93,6 +97,8 @@ def disasm(model: str, file: Path, *, output: Path | None = None, overwrite: boo
     """Turn a program image back into source, with labels for its jumps.
 
     The EEPROM file of a unit that `serve` keeps is taken as well.
+
+    For example: `detent disasm gs-c200 drill.img --output drill.gsc`
 
     Parameters
     ----------

@@ -38,6 +38,8 @@ def backup(
     That is its programs, its parameters, its memory, as far as it tells. Nothing is changed in the unit. The file
     is TOML; it is written whole or not at all. A file that is there is kept, and the backup gets a number: unit-2.toml.
 
+    For example: `detent backup gs-c200 /dev/ttyUSB0 machine.toml`
+
     Parameters
     ----------
     file
@@ -76,6 +78,8 @@ def restore(
 
     What differs is shown first, and nothing is written before you agree. What the unit holds now is kept in a file,
     which is named; if it fails half way, it says what is where.
+
+    For example: `detent restore gs-c200 /dev/ttyUSB0 machine.toml`
 
     Parameters
     ----------

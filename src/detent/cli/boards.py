@@ -42,6 +42,10 @@ def boards(
 
     Ends with 1 if nothing was found, or if a check found something wrong.
 
+    For example: `detent boards /dev/ttyACM0`
+
+    Or: `detent boards check cell.toml --axis slide`
+
     Parameters
     ----------
     what

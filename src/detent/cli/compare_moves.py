@@ -32,6 +32,9 @@ def compare_moves(
 
     Each of the settings is a word in quotes, like "S=48 T=604 R=202". They are judged with the same variants.
 
+    For example:
+    `detent compare-moves gs-c200 "S=48 T=604 R=201" "S=102 T=405 R=36" --motor qsh4218-41-10-035 --moves 1000`
+
     Parameters
     ----------
     model
@@ -47,7 +50,7 @@ def compare_moves(
     vary
         What variants differ in: inertia=0.2 (a part either way) or friction=0.3-2 (factors).
     variants
-        How many are drawn, beside all corners (512).
+        How many are drawn, beside all corners.
     seed
         Seed of the draws: the same one draws the same variants.
     plot

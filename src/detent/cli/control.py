@@ -25,9 +25,9 @@ def control(
     """Look at a cell that is served, meddle with it, break it.
 
     `detent serve TARGET --control 127.0.0.1:8400` prints the URL. Behind it a verb with its arguments, by place or as
-    --NAME VALUE; without a verb the state is shown, and `help` lists the verbs (`help VERB`: its arguments):
+    --NAME VALUE; without a verb the state is shown, and `help` lists the verbs (`help VERB`: its arguments).
 
-    detent control URL fault bar bit-errors --rate 0.01
+    For example: `detent control http://127.0.0.1:8400 fault bar bit-errors --rate 0.01`
 
     Parameters
     ----------

@@ -23,6 +23,8 @@ def demo(
 
     `detent examples` lists them.
 
+    For example: `detent demo menu --output pictures`
+
     Parameters
     ----------
     name

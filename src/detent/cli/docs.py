@@ -8,6 +8,8 @@ def docs(*, no_browser: bool = False, json: bool = False) -> None:
 
     In a checkout that is the site that `make docs` builds; an installed package has the same pages as text.
 
+    For example: `detent docs --no-browser`
+
     Parameters
     ----------
     no_browser

@@ -68,6 +68,8 @@ def epics(
     The records are called PREFIX and m1, m2, ... Without PORT the units are emulated here. Settings are in engineering
     units; RECORD=VALUE (m2=0.01) sets one record, VALUE alone all of them. Needs caproto.
 
+    For example: `detent epics gs-c200s --resolution 0.0025 --egu mm --low -10 --high 40 --velocity 5`
+
     Parameters
     ----------
     target

@@ -15,6 +15,8 @@ def examples(
 
     `detent demo NAME` runs one and draws it; the files of a copy can be run, served and changed.
 
+    For example: `detent examples copy drilling mine`
+
     Parameters
     ----------
     do

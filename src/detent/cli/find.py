@@ -28,6 +28,8 @@ def find(
 
     Ends with 1 if nothing was found.
 
+    For example: `detent find /dev/ttyUSB0 --model gs-c200`
+
     Parameters
     ----------
     ports

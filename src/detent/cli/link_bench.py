@@ -34,6 +34,8 @@ def bench(
     The question changes nothing in the unit. The reply time is from the first character handed over to the last one
     of the answer. What a serial line needs for the characters themselves is part of it.
 
+    For example: `detent bench gs-c200 /dev/ttyUSB0 --count 50`
+
     Parameters
     ----------
     count

@@ -12,6 +12,8 @@ def models(model: str | None = None, *, json: bool = False, markdown: bool = Fal
 
     The tables are its pins, straps, options and commands.
 
+    For example: `detent models gs-c200`
+
     Parameters
     ----------
     model

@@ -50,6 +50,8 @@ def motor(
 
     Without a name: the motors there are. Speeds are in steps/s of the stepping in use, as a controller counts them.
 
+    For example: `detent motor qsh4218-41-10-035 --supply 24 --move 1000 --start 400 --slew 4000 --ramp 300`
+
     Parameters
     ----------
     name
@@ -61,15 +63,15 @@ def motor(
     start
         Start-stop speed, steps/s; unless given one that the motor starts into, away from its resonance.
     slew
-        Slew speed, steps/s (1000).
+        Slew speed, steps/s; 1000 unless given.
     ramp
-        Steps of each ramp (50).
+        Steps of each ramp; 50 unless given.
     as_
         A controller and its settings, whose own law makes the move: --as dcb-274 I=800 V=6000 K=7,5.
     vary
         What variants differ in: inertia=0.2 (a part either way) or friction=0.3-2 (factors).
     variants
-        How many of them are drawn, beside all corners (512; 0: none, and no corners).
+        How many of them are drawn, beside all corners (512 unless given; 0: none, and no corners).
     seed
         Seed of the draws: the same one draws the same variants.
     sensitivity

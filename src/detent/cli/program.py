@@ -46,6 +46,8 @@ def upload(
     Labels and comments are fine. Nothing is sent unless all of it can be assembled. The program is not started. A
     GS-C200 stays in programming mode, which only E ends, by starting it; that is told.
 
+    For example: `detent upload gs-c200 /dev/ttyUSB0 drill.gsc --save`
+
     Parameters
     ----------
     file
@@ -88,6 +90,8 @@ def download(
     unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:
     """Read the program of a unit, as source with labels.
+
+    For example: `detent download gs-c200 /dev/ttyUSB0 drill.gsc`
 
     Parameters
     ----------
@@ -148,6 +152,8 @@ def compare(
 
     Ends with 1 if they differ. Both are compared as instructions at addresses: labels, comments and spelling do not
     matter. Where programs have places of their own, as on a DCB-274, those of the file are looked at.
+
+    For example: `detent compare gs-c200 /dev/ttyUSB0 drill.gsc`
 
     Parameters
     ----------

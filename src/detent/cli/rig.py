@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 if TYPE_CHECKING:
     from detent.motors.drive import Drive
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 LONGEST_FILE = 10_000_000  # bytes
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=Group("Drive and load", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class RigOptions:
     """Motor, drive and load.
@@ -31,11 +31,11 @@ class RigOptions:
     Parameters
     ----------
     supply
-        Supply of the drive, V (24).
+        Supply of the drive, V; 24 unless given.
     current
         Phase current with both phases on, A; the motor's own rating unless given.
     step
-        full, wave, half, half-compensated, or 1/2 to 1/64; half, or what the controller of --as does.
+        full, wave, half, half-compensated, or 1/2 to 1/64; half, or what the controller does, unless given.
     decay
         fast (unless given), slow, mixed, or voltage (pulse width without current feedback).
     drive

@@ -37,6 +37,8 @@ def run(
 
     Without --for it ends when nothing is left to do. Ends with status 1 if a line was refused or a motor lost steps.
 
+    For example: `detent run gs-c200 --send +1000 --send "@ idle" --send V1 --plot move.png`
+
     Parameters
     ----------
     target

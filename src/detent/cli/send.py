@@ -30,6 +30,8 @@ def send(
 
     Ends with 1 if a line was refused, ignored or not answered; program mode that the lines have begun is ended then.
 
+    For example: `detent send gs-c200 /dev/ttyUSB0 F V1`
+
     Parameters
     ----------
     lines
@@ -37,8 +39,8 @@ def send(
     raw
         The lines are bytes, with escapes like \r and \x1b, and go out as they are.
     wait
-        Seconds that a motion may take that a line waits for, and that a program of a DCB-274 is listened to that a
-        line has started, unless it ends before (60). With --raw: in which answers are collected (0.5).
+        Seconds to wait for a motion that a line waits for, or to listen to a program of a DCB-274 that a line has
+        started: at most, 60 unless given. With --raw: seconds in which answers are collected, 0.5 unless given.
     json
         Print one line of JSON.
     """

@@ -49,6 +49,10 @@ def serve(
     (a free TCP port where the system has none).
     What to connect to is printed.
 
+    For example: `detent serve gs-c200 --pty /tmp/gsc --strap CHS=low`
+
+    Or: `detent serve cell.toml --tcp 127.0.0.1:4001`
+
     Parameters
     ----------
     target

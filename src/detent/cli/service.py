@@ -35,6 +35,8 @@ def service(
     ready and that it is alive, has real-time priority, and is started again if it fails. What it has to say is in its
     journal.
 
+    For example: `detent service cell.toml --output cell.service`
+
     Parameters
     ----------
     cell

@@ -43,6 +43,8 @@ def size(page: str | None = None, values: Sequence[str] = (), /, *, json: bool =
 
     Its warnings are told, too. Without a page the pages are listed, without values what a page asks.
 
+    For example: `detent size gs-c200-slew`
+
     Parameters
     ----------
     page

@@ -35,6 +35,8 @@ def table(
 
     Without arguments it is the paper's table.
 
+    For example: `detent table linear --low 800 --high 9000 --duration "300 ms" --hex ramp.hex`
+
     Parameters
     ----------
     curve

@@ -43,6 +43,8 @@ def terminal(
 
     Lines that come from a pipe or a file are sent one after the other; it ends with 1 if one was refused or failed.
 
+    For example: `detent terminal gs-c200 /dev/ttyUSB0`
+
     Parameters
     ----------
     model

@@ -54,6 +54,11 @@ def tune(
     BS0610 or BS0710; the table of a SUPERSIGMA. The pulses that are judged are those that it gives for the commands
     printed. Ctrl-C prints the best so far.
 
+    For example:
+    `detent tune gs-c200 --motor qsh4218-41-10-035 --fit --inertia 1.5e-5 --friction 0.02 --moves 200,1000`
+
+    Or: `detent tune gs-c200s --on /dev/ttyUSB0 --witness UI1 --travel 1200 --moves 1000 --begin S=60 T=400 R=300`
+
     Parameters
     ----------
     model
@@ -75,7 +80,7 @@ def tune(
     no_corners
         Do not ask that every corner of these ranges makes the moves.
     variants
-        How many fresh variants must make them in the end (2048).
+        How many fresh variants must make them in the end.
     seed
         Seed of the draws: the same one gives the same answer.
     each_move

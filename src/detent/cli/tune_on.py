@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 from detent.cli.unit import UnitOptions
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from detent.tuner.machine.session import Plan, Record, Result
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=Group("Trials on the machine itself, in place of a computed motor", sort_key=3))
 @dataclass(frozen=True)
 class MachineOptions:
     """Trials on the machine itself, with its home switch as witness; they need no model of the motor.
@@ -49,7 +49,7 @@ class MachineOptions:
     confirm
         Trials of each move with the setting that is shipped.
     reserve
-        By what the last good ramp is made longer (2); 1.25 for the speed of a SUPERSIGMA.
+        By what the last good ramp is made longer: 2 unless given, and 1.25 for the speed of a SUPERSIGMA.
     unit
         Which unit is meant, and its line, as `detent send` has it: --unit address=2 checksums=no, name=A, motor=Y,
         drive=3, baud=1200.

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
 if TYPE_CHECKING:
     from detent.hosts import exchange
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from detent.hosts.exchange import Blocking, Watch
 
 
-@Parameter(name="*")
+@Parameter(name="*", group=Group("Which unit, and its line", sort_key=2))
 @dataclass(frozen=True)
 class UnitOptions:
     """Which unit is meant, and its line. Everything has the default of the model.
@@ -22,31 +22,31 @@ class UnitOptions:
     Parameters
     ----------
     address
-        GS-C200: 1 to 7 on a multipoint line.
+        GS-C200: address of a module on a multipoint line, 1 to 7; without it a module alone.
     no_checksum
-        GS-C200: CHS is strapped low.
+        GS-C200: without checksums, as where CHS is strapped low.
     revision
-        GS-C200: firmware revision; up to 2.1 checksums are another.
+        GS-C200: revision of its firmware; 2.2 unless given. Up to 2.1 checksums are made in another way.
     name
-        DCB-274: name of the axis on a party line, or as --mode says.
+        DCB-274: name of the axis on a party line, like A; or on another line, by --mode.
     mode
-        DCB-274: single, party, daisy or sin10.
+        DCB-274: single, party, daisy or sin10; party where --name is given, else single.
     first
         DCB-274: name of the first axis of a daisy chain.
     motor
-        BS0610, BS0710: X or Y.
+        BS0610, BS0710: X or Y; X unless given.
     drive
-        SUPERSIGMA: number of the drive, 0 to 255.
+        SUPERSIGMA: number of the drive, 0 to 255; 1 unless given.
     baud
-        Rate of the line.
+        Rate of the line, bits/s; that of the model unless given: 9600, but for a SUPERSIGMA.
     data_bits
-        Data bits of a character.
+        Data bits of a character, 7 or 8; those of the model unless given.
     parity
-        none, odd or even.
+        none, odd or even; that of the model unless given.
     stop_bits
-        Stop bits of a character.
+        Stop bits of a character, 1 or 2; those of the model unless given.
     patience
-        Seconds that the unit may take before it answers.
+        Seconds that the unit may take before it answers; 0.25 to 1 unless given, by the model.
     """
 
     address: int | None = None

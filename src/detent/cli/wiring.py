@@ -12,14 +12,11 @@ if TYPE_CHECKING:
 def wiring(readings: Sequence[str] = (), /, *, motor: str | None = None, json: bool = False) -> None:
     """Find a motor's windings from the resistances between its leads.
 
-    The orders to try are listed, too.
+    Measure every pair of leads with an ohmmeter and give the readings. What is found is followed by the orders in which
+    the leads may be connected, for the sequence test: with the power off between tries, connect the leads, then let
+    the motor go to 1000 and back. Only when the motor is wired correctly will it move smoothly both ways.
 
-    Measure every pair of leads with an ohmmeter and give the readings, like
-
-        detent wiring 1-2=10 1-3=open 1-4=open 2-3=open 2-4=open 3-4=10
-
-    The orders are those of the sequence test: with the power off between tries, connect the leads, then let the
-    motor go to 1000 and back. Only when the motor is wired correctly will it move smoothly both ways.
+    For example: `detent wiring 1-2=10 1-3=open 1-4=open 2-3=open 2-4=open 3-4=10`
 
     Parameters
     ----------

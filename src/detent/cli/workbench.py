@@ -52,6 +52,10 @@ def workbench(
     Without a target it is the drilling cell of the GS-C200 datasheet. With a model and a port it is the unit there, and
     beside it the same model, emulated. The address to open is printed; Ctrl-C ends it.
 
+    For example: `detent workbench gs-c200 --open`
+
+    Or: `detent workbench dcb-274 /dev/ttyUSB0`
+
     Parameters
     ----------
     target

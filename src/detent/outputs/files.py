@@ -18,9 +18,7 @@ class InTheWay(ValueError):
     """An output that cannot go where it should. The text says what to do."""
 
 
-def check_outputs(
-    paths: Iterable[Path | None], inputs: Iterable[Path] = (), *, asked: bool = False
-) -> None:
+def check_outputs(paths: Iterable[Path | None], inputs: Iterable[Path] = (), *, asked: bool = False) -> None:
     """The rule for every file that a verb writes; raises InTheWay before anything is done. None is no file.
 
     No file takes the place of another unasked: `asked` says that this was asked for, by --overwrite. What a run has
