@@ -71,7 +71,7 @@ from detent.workbench.pipe import Pipe
 from detent.workbench.waiting import Waiting, Waits
 
 BASE: Final = 210  # MB of both processes before anything has happened
-BATCH: Final = 480  # bytes that a batch of the recording takes, measured on the drilling cell
+BATCH: Final = 520  # bytes that a batch of the recording takes at most: of a host that polls, who says the most
 LEAST_KEPT: Final = 20_000  # batches, however little memory there may be
 BY_HAND = "by hand"
 BY_PROGRAM = "by a program"  # that controls it

@@ -24,8 +24,9 @@ from detent.uart import Sent
 from detent.workbench import rotors
 from detent.workbench.columns import Changes, Rows
 from detent.workbench.messages import Happened, Opened
+from detent.workbench.sharing import Sharing
 
-MOST_ROWS: Final = 1_000_000  # of a rotor: most of a minute of motion
+MOST_ROWS: Final = 1_000_000  # of all rotors, 56 MB: of a single one most of a minute of motion
 MOST_ACTIONS: Final = 200_000  # with more, they cannot be done again
 SLACK: Final = 4  # what is no longer needed is forgotten when it is so many-th of everything
 
@@ -209,7 +210,8 @@ class Mirror:
         self.views = list(opened.views)
         self.units = [Unit(view, opened.picture.units[view.name].straps) for view in self.views]
         self.by_name = {unit.view.name: unit for unit in self.units}
-        self.motors = {name: Rows(rotors.COLUMNS, MOST_ROWS) for name in opened.picture.motors}
+        room = MOST_ROWS // max(len(opened.picture.motors), 1)
+        self.motors = {name: Rows(rotors.COLUMNS, room) for name in opened.picture.motors}
         self.actions: list[TimedAction] = []
         self.complete = True  # the actions are all there ever were
         self.loaded: dict[str, TimedAction] = {}  # the program that was last loaded, by unit
@@ -221,17 +223,20 @@ class Mirror:
         self._before: list[Batch] = []  # what still counts of what is forgotten
         self._batches: list[Batch] = []
         self._first = 0  # the number of the first of them
+        self._sharing = Sharing()
 
     def take(self, happened: Happened) -> None:
         """More has happened."""
-        for number, (unit, entries) in enumerate(happened.batches, happened.first):
+        same, count = self._sharing.same, len(happened.batches)
+        for number, (unit, told) in enumerate(happened.batches, happened.first):
             taking = self.units[unit].take
+            entries = same(told, count)
+            self._batches.append((unit, entries))
             for entry in entries:
                 taking(number, entry)
                 if type(entry) is Sent or type(entry) is Received:
                     self.said.append((unit, entry))
                     self._said_in.append(number)
-        self._batches += happened.batches
         self.actions += happened.actions
         self.loaded |= {action.what.unit: action for action in happened.actions if isinstance(action.what, Load)}
         if len(self.actions) > MOST_ACTIONS:
