@@ -67,3 +67,32 @@ def test_a_key_that_is_held_runs_the_axis_until_it_is_let_go(windows: Windows, b
     window.until("(name) => detent.get(`r.${name}`).moving", name)
     window.page.mouse.up()
     window.until("(name) => detent.get(`r.${name}`).moving === false", name)
+
+
+def test_another_measure_moves_nothing_and_is_the_same_on_the_page_motion(windows: Windows, bench: Served) -> None:
+    window = windows.new(bench).open("/unit")
+    window.until(KNOWN)
+    page = window.page
+    name = window.get("r.names")[0]
+    page.get_by_role("tab", name=name, exact=True).click()
+    by, lead = page.get_by_label("Jog by"), page.locator("[data-role=lead]")
+    for measure in ("mm", "°"):
+        page.get_by_label("Unit of length").select_option(measure)
+        lead.fill("400")
+        lead.press("Tab")
+        assert by.input_value() == "0.25"
+        page.get_by_label("Unit of length").select_option("")
+        assert by.input_value() == "100"
+    page.get_by_label("Unit of length").select_option("°")
+    lead.fill("0")
+    lead.press("Tab")
+    before = window.get(f"r.{name}")["position"]
+    page.get_by_role("button", name="+ step, jog plus").click()
+    page.get_by_text("Write first how many steps a ° is").wait_for()
+    assert window.get(f"r.{name}")["position"] == before
+    lead.fill("0.8889")
+    lead.press("Tab")
+    page.get_by_role("link", name="Motion", exact=True).click()
+    page.locator(".motion-units").get_by_role("tab", name=name, exact=True).click()
+    window.until("() => document.querySelector('.motion [data-role=measure]').value === '°'")
+    assert lead.input_value() == "0.8889"

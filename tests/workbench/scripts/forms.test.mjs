@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { FORMS, grouped, pitch, seconds, wordsOf } from "./assets/forms.js";
+import { FORMS, grouped, pitch, remeasured, seconds, wordsOf } from "./assets/forms.js";
 
 test("numbers stand in groups of three, with a real minus", () => {
   assert.equal(grouped(0), "0");
@@ -43,4 +43,12 @@ test("whatever was thrown has words", () => {
   assert.equal(wordsOf(new Error("there is no unit")), "there is no unit");
   assert.equal(wordsOf("no unit"), "no unit");
   assert.equal(wordsOf(undefined), "undefined");
+});
+
+test("another measure is the same length, and what is no number stays what it is", () => {
+  assert.equal(remeasured("100", 1, 200), "0.5");
+  assert.equal(remeasured("0.5", 200, 1), "100");
+  assert.equal(remeasured("-90", 10 / 9, 1), "-100");
+  for (const written of ["", " ", "x", "Infinity"]) assert.equal(remeasured(written, 1, 200), written);
+  assert.equal(remeasured("100", 3, 3), "100");
 });

@@ -55,3 +55,15 @@ export function pitch(span, most) {
   const power = 10 ** Math.floor(Math.log10(raw));
   return power * ([1, 2, 5].find((n) => n * power >= raw) || 10);
 }
+
+/**
+ * The same length by another measure, as a field has it; what is no number stays what it is. Another measure moves nothing.
+ * @param {string} written
+ * @param {number} before steps in one of the measure in which it is written
+ * @param {number} after steps in one of the other
+ */
+export function remeasured(written, before, after) {
+  const value = Number(written);
+  if (written.trim() === "" || !Number.isFinite(value) || before === after) return written;
+  return String(+((value * before) / after).toPrecision(9));
+}

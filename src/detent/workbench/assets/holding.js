@@ -5,11 +5,11 @@ const HELD = 300; // ms between two words that a key is held
 
 /**
  * Make `buttons` run the unit `name()` at `rate(button)`, in steps/s with its sign, null for a rate that is none.
- * `sent(lines)` is told what was sent, `stopped(promise)` of the stop when the key is let go. Returns {letGo, end}:
+ * `sent(lines)` is told what was sent, `stopped(who, promise)` of the stop when the key is let go. Returns {letGo, end}:
  * `letGo(stop)` lets go of a key that is held, and stops the axis unless `stop` is false; `end` is for the end of the page.
  * @param {Part[]} buttons
  * @param {{name: () => string, rate: (button: Part) => number | null, sent: (lines: string[]) => void,
- *   stopped: (stopping: Promise<string>) => void}} told
+ *   stopped: (who: string, stopping: Promise<string>) => void}} told
  */
 export function holding(buttons, { name, rate, sent, stopped }) {
   let timer = 0;
@@ -20,7 +20,7 @@ export function holding(buttons, { name, rate, sent, stopped }) {
     clearInterval(timer);
     timer = 0;
     for (const one of buttons) one.classList.remove("down");
-    if (stop) stopped(call("unit_stop", held));
+    if (stop) stopped(held, call("unit_stop", held));
   }
 
   /** @param {Part} button */

@@ -1,5 +1,6 @@
 // Manual control of the axes of the page Cell: what is clicked is said to the unit by its host, in the unit's own commands.
 
+import { remeasured } from "./forms.js";
 import { holding } from "./holding.js";
 
 const { part, on, get, call, toast, failed, remembered, remember } = window.detent;
@@ -13,6 +14,14 @@ part("manual", (box) => {
   if (measure) measure.value = remembered(`measure.${facts.name}`) || "mm";
   /** Steps in one unit of what is written. */
   const scale = () => (measure && measure.value ? 1 / facts.lead : 1);
+  let scaled = 1; // the fields come in steps
+
+  /** The fields say the same lengths and rates by another measure: nothing goes farther because it is chosen. */
+  function measured() {
+    for (const one of ["by", "rate"]) role(one).value = remeasured(role(one).value, scaled, scale());
+    scaled = scale();
+  }
+  measured();
 
   /** @param {Part} field */
   function number(field) {
@@ -44,14 +53,15 @@ part("manual", (box) => {
     }
   }
 
-  /** @param {Promise<string>} stopping */
-  async function stopped(stopping) {
+  /**
+   * @param {string} who
+   * @param {Promise<string>} stopping
+   */
+  async function stopped(who, stopping) {
+    document.dispatchEvent(new CustomEvent("detent-stopping", { detail: { who, stopping } }));
     hold.letGo(false);
-    try {
-      say(await stopping);
-    } catch (error) {
-      failed(error);
-    }
+    const told = await stopping.catch(() => ""); // it stands above the page
+    if (told) say(told);
   }
 
   for (const button of box.querySelectorAll("[data-jog]")) button.addEventListener("click", () => {
@@ -64,7 +74,7 @@ part("manual", (box) => {
   });
   role("zero").addEventListener("click", () => move("zero"));
   for (const button of box.querySelectorAll("[data-home]")) button.addEventListener("click", () => move("home", Number(button.dataset.home)));
-  role("stop").addEventListener("click", () => stopped(there().then(() => call("unit_stop", name))));
+  role("stop").addEventListener("click", () => stopped(name, there().then(() => call("unit_stop", name))));
   const hold = holding([...box.querySelectorAll("[data-hold]")], {
     name: () => name,
     rate: (/** @type {Part} */ button) => {
@@ -78,7 +88,10 @@ part("manual", (box) => {
     sent: told,
     stopped,
   });
-  measure?.addEventListener("change", () => remember(`measure.${facts.name}`, measure.value));
+  measure?.addEventListener("change", () => {
+    measured();
+    remember(`measure.${facts.name}`, measure.value);
+  });
 
   /** @param {any} facts */
   function show(facts) {

@@ -211,7 +211,7 @@ export class Motion {
       turn = this.judged && this.judged.turn,
       travel = this.judged && this.judged.travel;
     if (measure !== this.measure) {
-      const known = measure === "deg" ? this.perTurn(turn || 200) / 360 : travel ? this.perTurn(turn) / travel : 1;
+      const known = measure === "\u00b0" ? this.perTurn(turn || 200) / 360 : travel ? this.perTurn(turn) / travel : 1;
       lead.value = +known.toPrecision(9);
     }
     detent.remember(this.leadName, JSON.stringify(measure ? [measure, Number(lead.value)] : null));

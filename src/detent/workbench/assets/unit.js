@@ -1,7 +1,7 @@
 // The page Unit: the unit that is chosen, filled into the markup of detent/workbench/pages/unit.py.
 
 import { worded } from "./elements.js";
-import { wordsOf } from "./forms.js";
+import { remeasured, wordsOf } from "./forms.js";
 import { holding } from "./holding.js";
 
 const { part, on, get, call, meant, make, toast, failed, remembered, remember, seconds, grouped } = window.detent;
@@ -21,6 +21,7 @@ part("unit", (box) => {
   const form = role("connect");
   /** @type {string | null} a name; null: the form */
   let chosen = null;
+  let scaled = 1; // steps in one of what the fields say
   let next = 0;
   let asking = false;
   let again = false;
@@ -248,10 +249,14 @@ part("unit", (box) => {
     const kept = JSON.parse(remembered(`lead.${chosen}`) || "null");
     role("measure").value = kept ? kept[0] : "";
     role("lead").value = kept ? kept[1] : 1;
+    [role("by").value, role("target").value, scaled] = ["100", "0", 1]; // what was written is of the unit before
     measured();
   }
 
+  /** The fields say the same lengths by another measure: nothing goes farther because it is chosen. */
   function measured() {
+    for (const one of ["by", "target"]) role(one).value = remeasured(role(one).value, scaled, lead() || 1);
+    scaled = lead() || 1;
     role("lead-label").hidden = !role("measure").value;
     role("lead-unit").textContent = role("measure").value;
     for (const one of ["by", "target"]) role(one).dataset.unit = role("measure").value || "steps";
@@ -259,7 +264,7 @@ part("unit", (box) => {
 
   for (const one of ["measure", "lead"]) role(one).addEventListener("change", () => {
     measured();
-    remember(`lead.${chosen}`, JSON.stringify([role("measure").value, role("lead").value]));
+    if (!role("measure").value || lead()) remember(`lead.${chosen}`, JSON.stringify([role("measure").value, role("lead").value]));
     show();
   });
 
@@ -273,7 +278,14 @@ part("unit", (box) => {
       toast("Write a number first.", "error");
       return null;
     }
-    return Math.round(value * (lead() || 1));
+    if (role("measure").value && !lead()) {
+      toast(`Write first how many steps a ${role("measure").value} is, a number above 0.`, "error");
+      return null;
+    }
+    const whole = Math.round(value * (lead() || 1));
+    if (Math.abs(whole) < 2 ** 31) return whole;
+    toast(`${grouped(whole)} steps are farther than any of these controllers goes.`, "error");
+    return null;
   }
 
   /**
@@ -296,11 +308,14 @@ part("unit", (box) => {
   role("zero").addEventListener("click", (event) => sure(event.currentTarget, "Click once more: where the axis stands is 0 then.", () => hand("zero", 0)));
   role("home").addEventListener("click", (event) => sure(event.currentTarget, `Click once more: the axis goes until it meets a switch. ${now().can.before_home}`,
     () => hand("home", Number(role("direction").value))));
-  role("stop").addEventListener("click", () => stopped(call("unit_stop", shown())));
+  role("stop").addEventListener("click", () => stopped(shown(), call("unit_stop", shown())));
 
-  /** @param {Promise<string>} stopping */
-  async function stopped(stopping) {
-    document.dispatchEvent(new CustomEvent("detent-stopping", { detail: stopping }));
+  /**
+   * @param {string} who
+   * @param {Promise<string>} stopping
+   */
+  async function stopped(who, stopping) {
+    document.dispatchEvent(new CustomEvent("detent-stopping", { detail: { who, stopping } }));
     held.letGo(false);
     const told = await stopping.catch(() => ""); // it stands above the page
     if (told) role("sent").textContent = told;

@@ -127,7 +127,7 @@ def _settings() -> str:
     return f"""<div class="panel motion-box"><h2>Settings</h2><div class="motion-sliders"></div>
     <div class="row motion-measure">{now}<span class="grow"></span>
       <label><span class="quiet">shown in</span> <select class="field" data-role="measure" aria-label="Shown in">
-        <option value="">steps</option><option value="mm">mm</option><option value="deg">degrees</option></select>
+        <option value="">steps</option><option value="mm">mm</option><option value="°">degrees</option></select>
       </label>
       <label data-role="lead-label" hidden><input class="field mono" type="number" data-role="lead" min="0" step="any"
         aria-label="Steps for one"> <small>steps for 1 <span data-role="lead-unit">mm</span></small></label></div>
