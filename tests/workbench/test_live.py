@@ -9,6 +9,7 @@ import pytest
 from pydantic import Field
 from starlette.websockets import WebSocketDisconnect
 
+import detent.workbench.live
 from detent.workbench.live import Live
 
 
@@ -109,7 +110,7 @@ def test_a_new_window_gets_the_whole_table_and_then_what_changes(live: Live) -> 
 
         await with_window(live, socket, change)
         assert socket.sent[0]["set"]["held"] is False
-        assert all("held" not in message["set"] for message in socket.sent[1:])
+        assert all("held" not in message.get("set", {}) for message in socket.sent[1:])
 
     asyncio.run(run())
 
@@ -176,6 +177,41 @@ def test_a_call_is_answered_with_its_value_or_with_the_reason_why_not(live: Live
 @pytest.mark.parametrize("garbage", ["", "{", "[]", "7", '{"call": "add"}', '{"id": "x", "call": "add"}'])
 def test_garbage_from_a_window_is_ignored(live: Live, garbage: str) -> None:
     assert answers(live, garbage, {"id": 1, "call": "add", "args": [1]}) == [{"id": 1, "value": 2}]
+
+
+def test_a_window_hears_something_where_nothing_changes(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detent.workbench.live, "BEAT", 0.01)
+
+    async def run() -> None:
+        socket = Socket()
+
+        async def beats() -> None:
+            await socket.until(lambda: socket.sent.count({}) >= 3)
+
+        await with_window(live, socket, beats)
+
+    asyncio.run(run())
+
+
+def test_what_a_window_asks_for_is_done_though_it_leaves_at_once(live: Live) -> None:
+    done: list[str] = []
+
+    async def stop() -> None:
+        done.append("begun")
+        await asyncio.sleep(0)
+        done.append("confirmed")
+
+    live.offer("stop", stop)
+
+    async def run() -> None:
+        socket = Socket({"id": 1, "call": "stop"})
+        socket.leave.set()
+        await live.serve(socket)  # type: ignore[arg-type]
+        for _ in range(10):
+            await asyncio.sleep(0)
+
+    asyncio.run(run())
+    assert done == ["begun", "confirmed"]
 
 
 def test_a_call_is_offered_once(live: Live) -> None:

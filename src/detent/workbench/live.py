@@ -1,7 +1,8 @@
 """What all windows show, as one flat table of keys and values, and the calls that they make.
 
 One socket a window (`/live`). The server pushes what changed since it pushed last, as JSON ``{"set": {KEY: VALUE}}``;
-a window that is slow gets fewer and newer values, never a queue. A window calls
+a window that is slow gets fewer and newer values, never a queue. It hears something every `BEAT` seconds, if only
+``{}``: so a window knows a server that hangs from a cell that stands. A window calls
 ``{"call": NAME, "args": [...], "id": N}`` and gets ``{"id": N, "value": ...}`` or ``{"id": N, "error": TEXT}``.
 """
 
@@ -21,6 +22,7 @@ Call: TypeAlias = Callable[..., Awaitable[object]]
 
 MISTAKES = (ValueError, KeyError, TypeError, OSError, RuntimeError)  # whose text is for the person at the window
 LONGEST_CALL = 1 << 20  # characters
+BEAT = 1.0  # seconds
 
 
 class Live:
@@ -30,6 +32,7 @@ class Live:
         self._table: dict[str, Value] = {}
         self._windows: set[_Window] = set()
         self._calls: dict[str, Call] = {}
+        self._answers: set[asyncio.Task[None]] = set()
 
     @property
     def windows(self) -> int:
@@ -56,28 +59,29 @@ class Live:
         self._calls[name] = validate_call(call)
 
     async def serve(self, socket: WebSocket) -> None:
-        """One window, from its socket's opening to its end."""
+        """One window, from its socket's opening to its end.
+
+        What it has asked for is done though it leaves at once: who closes a window behind a STOP has stopped.
+        """
         await socket.accept()
         window = _Window(socket)
         window.show(self._table)
         self._windows.add(window)
         self.put({"windows": self.windows})
         sender = asyncio.create_task(window.send())
-        answers: set[asyncio.Task[None]] = set()
         try:
             while True:
                 text = await socket.receive_text()
                 if len(text) > LONGEST_CALL:
                     break
                 answer = asyncio.create_task(self._answer(window, text))
-                answers.add(answer)
-                answer.add_done_callback(answers.discard)
+                self._answers.add(answer)
+                answer.add_done_callback(self._answers.discard)
         except (WebSocketDisconnect, RuntimeError, KeyError):  # gone, or it sent what is no text
             pass
         finally:
             self._windows.discard(window)
-            for task in (sender, *answers):
-                task.cancel()
+            sender.cancel()
             self.put({"windows": self.windows})
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await socket.close()
@@ -125,12 +129,15 @@ class _Window:
         """Send what there is, for ever."""
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
-                await self._work.wait()
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(BEAT):
+                        await self._work.wait()
                 self._work.clear()
                 values, self._values = self._values, {}
                 replies, self._replies = self._replies, []
-                if values:
-                    await self._socket.send_text(json.dumps({"set": values}, separators=(",", ":")))
+                if values or not replies:
+                    told = {"set": values} if values else {}
+                    await self._socket.send_text(json.dumps(told, separators=(",", ":")))
                 for answer in replies:
                     await self._socket.send_text(json.dumps(answer, separators=(",", ":"), default=_plain))
 

@@ -82,6 +82,9 @@ def _top(title: str, pages: Sequence[Page]) -> str:
 <div class="alarm silent" role="alert"><span>The process of the cell has said nothing for <b data-live="silent"></b> s:
   this computer is very busy, or it hangs. <b class="stoppable">STOP ends it, and boards that it drives stop.</b></span>
   <button class="key small" data-do="end_silent">End it, and start it again</button></div>
+<div class="alarm mute" role="alert"><span>No answer from the workbench since <b></b> s: what this page
+  shows is older. <b class="stoppable">STOP may reach nothing: if something moves, switch off the supply of its
+  motor.</b></span></div>
 <div class="alarm link" role="alert">No connection to the workbench. Trying again …
   <b class="stoppable">STOP reaches nothing meanwhile: if something moves, switch off the supply of its motor.</b></div>
 <div class="alarm unconfirmed" role="alert" data-part="unconfirmed"><span></span>

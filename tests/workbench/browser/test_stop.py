@@ -97,8 +97,13 @@ def test_a_stop_that_is_not_confirmed_stands_above_the_page(
         try:
             window.page.locator("header").get_by_role("button", name="STOP", exact=True).click()
             window.page.get_by_text("STOP is not confirmed yet. If something moves, switch off the supply").wait_for()
+            mute = window.page.locator(".alarm.mute")
+            mute.get_by_text("No answer from the workbench since").wait_for()
+            mute.get_by_text("STOP may reach nothing").wait_for()
+            window.picture("mute")
         finally:
             os.kill(hung.process.pid, signal.SIGCONT)
+        mute.wait_for(state="hidden")
         window.page.locator(".alarm.unconfirmed").wait_for(state="hidden")
         window.page.close()
         windows.opened.remove(window)

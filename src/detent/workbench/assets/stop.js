@@ -1,5 +1,6 @@
 // One STOP above every page, and Esc twice, for everything that says it can be stopped (detent.workbench.stopping).
 
+import { ALL, Confirming } from "./confirming.js";
 import { wordsOf } from "./forms.js";
 
 const { part, on, get, call, toast } = window.detent;
@@ -7,20 +8,17 @@ const TWICE = 700; // ms between two presses of Esc
 const SOON = 2500; // ms in which most stops are confirmed; who stands at the machine is told no later that one is not
 const HELP = "If something moves, switch off the supply of its motor.";
 
-let told = ""; // what stands above the page until somebody has seen it
-let pressed = 0;
+const stops = new Confirming();
 
-/** @param {string} text */
-function tell(text) {
-  told = text;
-  for (const box of document.querySelectorAll(".alarm.unconfirmed")) show(/** @type {HTMLElement} */ (box));
+function show() {
+  for (const box of document.querySelectorAll(".alarm.unconfirmed")) showIn(/** @type {HTMLElement} */ (box));
 }
 
 /** @param {HTMLElement} box */
-function show(box) {
+function showIn(box) {
   const words = box.querySelector("span");
-  if (words) words.textContent = told;
-  box.classList.toggle("shown", told !== "");
+  if (words) words.textContent = stops.words;
+  box.classList.toggle("shown", stops.words !== "");
 }
 
 async function stopAll() {
@@ -28,30 +26,42 @@ async function stopAll() {
   // a question that is open is answered by STOP: nothing of it is done
   for (const dialog of document.querySelectorAll("dialog")) if (dialog.open) dialog.close("");
   const stopping = call("stop_all");
-  watch(stopping);
+  watch(ALL, stopping);
   for (const one of await stopping.catch(() => [])) toast(`STOP: ${one}`);
 }
 
+/** Whether the workbench can be heard: a STOP is not confirmed for long, then, and that is told at once. */
+const heard = () => document.documentElement.dataset.link === "up" && !document.documentElement.dataset.mute;
+
 /**
  * Tell whoever stands at the machine that a stop is not confirmed: soon, and until it is, or has been seen.
+ * @param {string} who
  * @param {Promise<any>} stopping
  */
-async function watch(stopping) {
-  const mine = (pressed += 1);
-  const late = setTimeout(() => mine === pressed && tell(`STOP is not confirmed yet. ${HELP}`), SOON);
+async function watch(who, stopping) {
+  const mine = stops.begin(who);
+  const name = who === ALL ? "STOP" : `STOP of ${who}`;
+  const late = setTimeout(() => {
+    stops.tell(who, mine, `${name} is not confirmed yet. ${HELP}`);
+    show();
+  }, heard() ? SOON : 0);
   try {
     await stopping;
-    if (mine === pressed) tell("");
+    stops.done(who, mine);
   } catch (error) {
     const words = wordsOf(error);
-    if (mine === pressed) tell(`STOP: ${words}${/switch off the supply/.test(words) ? "" : `. ${HELP}`}`);
+    stops.tell(who, mine, `${name}: ${words}${/switch off the supply/.test(words) ? "" : `. ${HELP}`}`);
   } finally {
     clearTimeout(late);
+    show();
   }
 }
 
 // the STOP of a single unit, and a key that is let go
-document.addEventListener("detent-stopping", (event) => watch(/** @type {CustomEvent} */ (event).detail));
+document.addEventListener("detent-stopping", (event) => {
+  const { who, stopping } = /** @type {CustomEvent} */ (event).detail;
+  watch(who, stopping);
+});
 
 const able = () => (get("stop.able") || []).length > 0;
 
@@ -64,8 +74,11 @@ part("stop", (button) => {
 });
 
 part("unconfirmed", (box) => {
-  box.querySelector("[data-close]").addEventListener("click", () => tell(""));
-  show(box);
+  box.querySelector("[data-close]").addEventListener("click", () => {
+    stops.seen();
+    show();
+  });
+  showIn(box);
 });
 
 let last = -TWICE;

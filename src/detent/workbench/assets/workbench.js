@@ -3,6 +3,7 @@
 
 import { FORMS, grouped, seconds, wordsOf } from "./forms.js";
 import { Meanings } from "./meanings.js";
+import { Silence } from "./silence.js";
 
 /** @type {Map<string, any>} the live table, as far as this window knows it */
 const values = new Map();
@@ -22,8 +23,11 @@ const meanings = new Meanings((key) => values.get(key));
 /** @type {(() => void)[]} what is called when there is a connection */
 const opening = [];
 const PATIENCE = 8000; // ms that a call waits for one
+const MUTE = 3000; // ms without a word of the server, which speaks every second, until a person is told
+const GIVEN_UP = 20000; // ms: then a new connection is tried, as this one may have been lost on its way
 /** @type {WebSocket | null} */
 let socket = null;
+const silence = new Silence(MUTE, performance.now());
 let calls = 0;
 let pause = 250; // ms before the next attempt to connect
 
@@ -31,13 +35,15 @@ let pause = 250; // ms before the next attempt to connect
 
 function connect() {
   const scheme = location.protocol === "https:" ? "wss:" : "ws:";
-  socket = new WebSocket(`${scheme}//${location.host}/live`);
-  socket.onopen = () => {
+  const mine = (socket = new WebSocket(`${scheme}//${location.host}/live`));
+  mine.onopen = () => {
     pause = 250;
+    silence.heard(performance.now());
     document.documentElement.dataset.link = "up";
     for (const go of opening.splice(0)) go();
   };
-  socket.onmessage = (event) => {
+  mine.onmessage = (event) => {
+    silence.heard(performance.now());
     const told = JSON.parse(event.data);
     const asked = waiting.get(told.id);
     if (told.set) take(told.set);
@@ -48,13 +54,26 @@ function connect() {
       else resolve(told.value);
     }
   };
-  socket.onclose = () => {
-    document.documentElement.dataset.link = "down";
-    for (const [, reject] of waiting.values()) reject(new Error("the workbench does not answer"));
-    waiting.clear();
-    setTimeout(connect, pause);
-    pause = Math.min(pause * 2, 4000);
-  };
+  mine.onclose = () => mine === socket && lost();
+}
+
+function lost() {
+  socket = null;
+  document.documentElement.dataset.link = "down";
+  for (const [, reject] of waiting.values()) reject(new Error("the workbench does not answer"));
+  waiting.clear();
+  setTimeout(connect, pause);
+  pause = Math.min(pause * 2, 4000);
+}
+
+function listenForSilence() {
+  const passed = socket && socket.readyState === WebSocket.OPEN ? silence.look(performance.now()) : 0;
+  document.documentElement.dataset.mute = passed ? "yes" : "";
+  for (const words of all(".alarm.mute b:first-child")) words.textContent = String(Math.round(passed / 1000));
+  if (passed > GIVEN_UP) {
+    socket?.close();
+    lost();
+  }
 }
 
 /**
@@ -513,3 +532,4 @@ on("title", (key, value) => {
 });
 watchDocument();
 connect();
+setInterval(listenForSilence, 1000);
