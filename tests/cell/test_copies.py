@@ -4,6 +4,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.cell.cells import cell
 from tests.controllers.gsc200.inputs import commands, stored
+from tests.generated import examples
 
 from detent.cell.cell import Cell
 from detent.ticks import MS, SECOND
@@ -93,7 +94,7 @@ ACTIONS = st.lists(
     ),
     max_size=14,
 )
-SETTINGS = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+SETTINGS = settings(max_examples=examples(40), deadline=None, suppress_health_check=list(HealthCheck))
 
 
 def made(**options: object) -> Cell:

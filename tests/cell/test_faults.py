@@ -4,6 +4,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.cell.cells import cell, edges
+from tests.generated import examples
 
 from detent.cell.actions import Break, TimedAction
 from detent.cell.cell import Cell
@@ -250,7 +251,7 @@ def all_of(target: Cell) -> list:
     return [list(target.recording), heard, [net.level for net in target.circuit.nets], target.now, target.next_event()]
 
 
-SETTINGS = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+SETTINGS = settings(max_examples=examples(60), deadline=None, suppress_health_check=list(HealthCheck))
 
 
 @SETTINGS

@@ -7,6 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tests.cell.cells import cell
 from tests.cell.test_copies import ACTIONS, DESCRIPTION, FILES
+from tests.generated import examples
 
 from detent.cell.actions import Action, Load, PlaceSwitch, Power, Release, Send, SetPin, SetSwitch, Start, Type
 from detent.cell.build import build
@@ -20,7 +21,7 @@ from detent.pins import PinSet
 from detent.ticks import MS, SECOND, Ns
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-SETTINGS = settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+SETTINGS = settings(max_examples=examples(25), deadline=None, suppress_health_check=list(HealthCheck))
 LOOPING = 'title = "t"\n[units.a]\nmodel = "gs-c200"\nprogram = "a.gsc"\nstraps = { CHS = 0 }\n'
 LOOP = {"a.gsc": "S50\nL0\nA1\n+20\nC1\nD1\nL3\n"}  # addresses 0 4 6 8 12 14 16
 

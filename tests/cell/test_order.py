@@ -9,6 +9,7 @@ from typing import NamedTuple
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.cell.build import build
 from detent.cell.cell import Cell
@@ -157,13 +158,13 @@ def sequences(draw: st.DrawFn) -> tuple[Plan, list[str], dict[str, int]]:
 
 
 @given(orders())
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 def test_the_order_in_the_file_changes_no_pulse(case: tuple[Plan, list[str]]) -> None:
     check_order(*case)
 
 
 @given(sequences())
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 def test_which_unit_is_switched_on_first_changes_no_pulse(case: tuple[Plan, list[str], dict[str, int]]) -> None:
     check_supply(*case)
 

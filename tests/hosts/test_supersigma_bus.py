@@ -6,6 +6,7 @@ Nothing marks where a message begins (Cassinis, table 1): see `detent.hosts.micr
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 from tests.hosts.test_supersigma_cells import positions, robot
 
 from detent.cell.faults import OnLine
@@ -53,13 +54,13 @@ def check_stop(garbage: bytes, after: int) -> None:
 
 
 @given(GARBAGE, MOVES)
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 def test_whatever_came_before_a_ccu_moves_what_it_says(garbage: bytes, moves: list[tuple[int, int]]) -> None:
     check_moves(garbage, moves)
 
 
 @given(GARBAGE, st.integers(0, 2000))
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 def test_whatever_came_before_a_stop_stops(garbage: bytes, after: int) -> None:
     check_stop(garbage, after)
 

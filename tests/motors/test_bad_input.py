@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 from tests.motors.moves import SMALL, even, rig
 
 from detent.motors.curve import pull_out
@@ -109,7 +110,7 @@ def test_variants_must_share_what_the_pulses_go_through() -> None:
     assert judge(even(100, 3), []) == []
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(
     st.floats(0.05, 50), st.floats(1e-5, 0.05), st.floats(0.1, 10), st.floats(0.01, 20), st.floats(1e-8, 1e-2),
     st.floats(5, 200), st.sampled_from(["fast", "slow", "voltage"]), st.floats(20, 20_000), st.integers(1, 60),

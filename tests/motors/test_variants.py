@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 from tests.motors.moves import LARGE, SMALL, even, ramped, rig
 
 from detent.motors import chance, engine
@@ -126,7 +127,7 @@ def test_none_of_2048_is_less_than_a_hundred_and_fiftieth_of_a_percent_of_ten() 
     assert chance.bound(7, 7) == 1.0
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 @given(st.integers(1, 400), st.integers(0, 400))
 def test_the_bound_is_the_one_of_clopper_and_pearson(tried: int, lost: int) -> None:
     """With that rate, as few losses or fewer have a chance of just 5 %."""

@@ -6,6 +6,7 @@ from fractions import Fraction
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.outputs.steps import FAR, MOST_ADD, MOST_STEPS, Error, Run, Runs, Scale, ticks
 from detent.pulses import Accelerating, Table, Train, Uniform
@@ -71,7 +72,7 @@ def fits_firmware(runs: list[Run]) -> None:
         assert 0 < min(intervals) <= max(intervals) < 1 << 31
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(TRAINS, st.sampled_from(CLOCKS), st.sampled_from(ERRORS))
 def test_every_pulse_is_in_its_window(train: Train, frequency: int, error: Error) -> None:
     scale = Scale(frequency)
@@ -92,7 +93,7 @@ def test_every_pulse_is_in_its_window_at_length(train: Train, frequency: int, er
     fits_firmware(runs)
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(TRAINS, st.sampled_from(CLOCKS), st.sampled_from(ERRORS), st.data())
 def test_pieces_are_the_whole(train: Train, frequency: int, error: Error, data: st.DataObject) -> None:
     """Wherever the pulses are split, they fall on the same ticks: what is sent piece by piece is the same motion."""

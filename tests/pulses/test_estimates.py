@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.pulses import Accelerating, Train, Uniform, ramp_arrays, ramp_estimates, short
 from detent.pulses.settling import FARTHEST, MOST_PLACES, scale_for
@@ -64,7 +65,7 @@ starts = st.one_of(st.just(0), st.integers(0, 10**18).map(to_fixed), st.integers
 
 
 @given(st.integers(1, 1000), st.integers(1, 1000), st.integers(1, 999), st.integers(1, 6000), starts)
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_a_move_asked_as_a_whole_gives_what_each_pulse_gives(start_stop, slew, ramp, steps, start) -> None:
     train = move.__wrapped__(10 * start_stop, 10 * slew, ramp, steps).train.at(start)
     out = np.zeros(steps, np.int64)

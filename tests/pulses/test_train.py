@@ -261,7 +261,7 @@ def test_beyond_292_years_scalars_go_on_and_arrays_refuse():
 
 
 @given(st.integers(2**53, 2**62), st.data())
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 def test_beyond_104_days_every_pulse_is_still_exact(begin: int, data):
     """float64 has no room for these nanoseconds: neither late starts nor long segments may feel it."""
     long = Uniform(0, 10**7 + 1, 3, 3 * 10**9)

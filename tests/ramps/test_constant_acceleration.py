@@ -6,6 +6,7 @@ from math import isqrt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.pulses import Accelerating, Uniform
 from detent.ramps.constant_acceleration import move
@@ -29,7 +30,7 @@ def ramp_time(slow: int, gain: Fraction, x: int) -> Fraction:
 
 
 @given(speeds, speeds, ramps, st.integers(1, 3000), starts)
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_every_pulse_is_within_half_a_nanosecond_of_the_law(start_stop, slew, ramp, steps, start):
     train = move(start_stop, slew, ramp, steps).train.at(start)
     assert train.steps == steps

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controllers.dcb274.bench_unit import Bench
 from tests.controllers.dcb274.inputs import command
+from tests.generated import examples
 
 from detent.controllers.dcb274.firmware import Dcb274
 from detent.controllers.device import Refused
@@ -33,7 +34,7 @@ def registers(bench: Bench) -> dict[str, Any]:
 
 @pytest.mark.parametrize("mode", START)
 @given(noise=NOISE)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 def test_no_input_brings_the_unit_down(mode: str, noise: list[bytes]) -> None:
     unit = Dcb274({"PARTY": int(mode == "party")}, line_timing=mode == "single")
     unit.power(True, 0)
@@ -50,7 +51,7 @@ def test_no_input_brings_the_unit_down(mode: str, noise: list[bytes]) -> None:
 
 
 @given(text=command())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_a_line_that_is_answered_with_a_cross_changes_nothing(text: str) -> None:
     if any(not " " <= c <= "~" for c in text) or len(text) > 15:
         return

@@ -6,10 +6,11 @@ from hypothesis import strategies as st
 from tests.controllers.conformance import Candidate
 from tests.controllers.dcb274 import inputs
 from tests.controllers.test_conformance import check_all
+from tests.generated import examples
 
 # a schedule takes long to shrink; the thorough set does it
 FAST = settings(
-    max_examples=20,
+    max_examples=examples(20),
     deadline=None,
     phases=[Phase.explicit, Phase.reuse, Phase.generate],
     suppress_health_check=list(HealthCheck),

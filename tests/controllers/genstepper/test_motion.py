@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.controllers.genstepper.boards import Board
 from tests.controllers.genstepper.firmware_loop import TICK, LoopMotor
+from tests.generated import examples
 
 from detent.axis import MotionEnded, MotionStarted
 from detent.ticks import MS, SECOND
@@ -65,7 +66,7 @@ def obey(loop: LoopMotor, letter: str, value: object) -> None:
 stories = st.lists(st.tuples(orders, st.integers(1, 120_000_000)), min_size=1, max_size=8)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(stories)
 def test_whatever_comes_in_motion_gives_the_steps_of_the_tick_by_tick_loop(story):
     check_against_the_loop(story)

@@ -2,6 +2,7 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.cell.build import build
 from detent.cell.cell import Cell
@@ -39,7 +40,7 @@ def test_a_program_that_goes_there_tells_too() -> None:
 
 
 @given(st.integers(0, 400), st.sampled_from(["H+", "H-"]), st.sampled_from(["K", "Z"]), st.integers(0, 60))
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 def test_it_is_told_of_those_gotos_and_of_no_other(wait: int, home: str, stop: str, begin: int) -> None:
     """Law: a goto is cautioned of if, and only if, it goes away from where the axis came from."""
     start = [(f"+{begin}", 0)] if begin else []

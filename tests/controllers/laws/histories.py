@@ -9,12 +9,13 @@ from random import Random
 from typing import Any, NamedTuple, TypeVar
 
 from tests.controllers.laws.bench import Action, Contact, Wait
+from tests.generated import examples
 
 from detent.ticks import MS, Ns
 
 T = TypeVar("T")
 
-ORDINARY, THOROUGH = 400, 10_000  # histories of a model that a law is held against
+ORDINARY, THOROUGH = examples(400), 10_000  # histories of a model that a law is held against
 GAPS: Sequence[Ns] = (0, 0, 0, 1, 1 * MS, 2 * MS, 12 * MS, 40 * MS, 90 * MS, 150 * MS, 400 * MS, 700 * MS, 4000 * MS)
 
 

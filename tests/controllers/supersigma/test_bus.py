@@ -7,6 +7,7 @@ place finds it again is Detent's own; the paper's protocol "is given [1,3]".
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples
 
 from detent.axis import MotionStarted
 from detent.controllers.device import Output, Refused
@@ -113,13 +114,13 @@ def check_half(command: Command, cut: int, messages: list[Command], *, lets_go: 
 
 
 @given(GARBAGE, COMMANDS)
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_behind_a_silence_every_message_does_what_it_says(garbage: bytes, messages: list[Command]) -> None:
     check_silence(garbage, messages)
 
 
 @given(COMMANDS, st.integers(1, 4), COMMANDS, st.booleans())
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_half_a_message_changes_nothing_of_what_follows_a_silence_or_another_program(
     half: list[Command], cut: int, messages: list[Command], lets_go: bool
 ) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from random import Random
 
 import pytest
+from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Wire, no_file
 from tests.realtime.boards.test_real_service import Wall
 
@@ -92,7 +93,7 @@ def test_a_jog_goes_there_and_back_and_lets_the_driver_go() -> None:
     assert bench.jog()[1].made == 100  # and once more
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(8))
 def test_a_computer_that_is_busy_makes_no_check_fail(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is elsewhere while it makes a batch, for longer than a batch may be late."""
     random, bench = Random(seed), Bench(TMC if seed % 2 else CELL)

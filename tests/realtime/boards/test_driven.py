@@ -5,6 +5,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench, pulses
 
 from detent.realtime.boards.events import DriverFault
@@ -528,7 +529,7 @@ def holds(seed: int) -> None:
 
 
 def test_holds_at_any_time_lose_no_step() -> None:
-    for seed in range(12):
+    for seed in seeds(12):
         holds(seed)
 
 

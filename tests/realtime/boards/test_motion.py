@@ -4,6 +4,7 @@ from fractions import Fraction
 from random import Random
 
 import pytest
+from tests.generated import seeds
 from tests.realtime.boards.bench import SLIDE, Bench, bench
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
@@ -99,7 +100,7 @@ def test_an_exact_pulse_is_on_its_nearest_tick() -> None:
     assert [tick for tick, _, _ in made.machine.steps] == [scale.tick(time) for time, _ in kept["slide"].times]
 
 
-@pytest.mark.parametrize("period", [25 * SECOND, 150 * SECOND, 270 * SECOND])
+@pytest.mark.parametrize("period", [25 * SECOND, pytest.param(150 * SECOND, marks=pytest.mark.slow), 270 * SECOND])
 def test_slow_pulses_go_on_from_the_last_one(period: Ns) -> None:
     """A step in 25 s is more than 2**28 ticks of 16 MHz, one in 150 s more than 2**31, one in 270 s more than 2**32.
 
@@ -179,7 +180,7 @@ def prove_program(seed: int) -> None:
     assert made.boards.ready
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(16))
 def test_random_programs(seed: int) -> None:
     prove_program(seed)
 

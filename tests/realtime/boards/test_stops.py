@@ -3,6 +3,7 @@
 from random import Random
 
 import pytest
+from tests.generated import seeds
 from tests.realtime.boards.bench import Bench, bench
 
 from detent.axis import MotionStarted
@@ -215,7 +216,7 @@ def prove_stop(seed: int) -> None:
     assert not made.of(CountDiffers)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", seeds(12))
 def test_random_stops(seed: int) -> None:
     prove_stop(seed)
 

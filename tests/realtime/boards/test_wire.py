@@ -5,6 +5,7 @@ from random import Random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.generated import examples, seeds
 
 from detent.realtime.boards.dictionary import BARE, Dictionary, Format
 from detent.realtime.boards.fake.board import FakeBoard
@@ -175,7 +176,7 @@ def converse(seed: int, loss: float) -> None:
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.02, 0.2])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(8))
 def test_a_bad_wire_loses_nothing(seed: int, loss: float) -> None:
     converse(seed, loss)
 
@@ -213,7 +214,7 @@ def test_a_message_longer_than_a_block_is_an_error() -> None:
         link.flush(0)
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.lists(st.binary(max_size=80), max_size=20))
 def test_whatever_comes_from_a_board_breaks_nothing(pieces: list[bytes]) -> None:
     link = Link()
