@@ -31,6 +31,21 @@ def run(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> str:
     return told.out if not code else told.err
 
 
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A grid of a few settings in the place of thousands."""
+
+    def made(task: Task) -> Space:
+        whole = space(task)
+        values = ((40, 90), (200, 400, 600), (20, 40, 80, 160))
+        return whole._replace(
+            dimensions=tuple(one._replace(values=some) for one, some in zip(whole.dimensions, values, strict=True))
+        )
+
+    monkeypatch.setattr("detent.tuner.judge.space", made)
+
+
+@pytest.mark.usefixtures("few")
 def test_a_tuned_move_is_told_with_what_is_proved_of_it(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     program, table = tmp_path / "tuned.gsc", tmp_path / "map.csv"
     words = ["tune", "gs-c200", *RIG, "--moves", "60", "--variants", "64", "--into", str(program), "--json",
@@ -119,6 +134,7 @@ def test_settings_are_compared_with_the_same_variants(capsys: pytest.CaptureFixt
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.usefixtures("few")
 def test_a_batch_answers_row_by_row_and_a_row_without_answer_says_why(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -147,21 +163,13 @@ SMALL = ["--variants", "64", "--no-corners", "--no-gpu"]
 
 
 @pytest.fixture
-def planted(monkeypatch: pytest.MonkeyPatch) -> None:
+def planted(few: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """A few settings, of which no motor is asked: what has a ramp below 60 is lost."""
-
-    def few(task: Task) -> Space:
-        made = space(task)
-        values = ((40, 90), (200, 400, 600), (20, 40, 80, 160))
-        return made._replace(
-            dimensions=tuple(one._replace(values=some) for one, some in zip(made.dimensions, values, strict=True))
-        )
 
     def answer(_: Judge, job: Job) -> Lost:
         lost = job.variants if job.point[2] < 60 else ()
         return lost if job.to_the_end else lost[:1]
 
-    monkeypatch.setattr("detent.tuner.judge.space", few)
     monkeypatch.setattr(Judge, "answer", answer)
     monkeypatch.setattr(tuning, "models", lambda *_: ())
     monkeypatch.setattr(tuning, "fails", lambda *_: ())

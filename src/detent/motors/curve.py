@@ -6,6 +6,7 @@ at the load angle where it is greatest, is the pull-out torque. No resonance and
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from math import ceil, degrees, floor, pi
 from typing import NamedTuple
 
@@ -141,9 +142,17 @@ def pull_out(motor: Motor, drive: Drive, rate: float, *, level: float = 1.0) -> 
     The motor's own friction is subtracted, a load's is not: this is the torque that is there for it.
     """
     check_rate(rate)
-    asked, rate = rate, max(rate, min(STANDING, 0.006 * motor.resistance / motor.real_inductance))
+    turned = max(rate, min(STANDING, 0.006 * motor.resistance / motor.real_inductance))
     # an inertia is not needed here, and not every maker gives one
-    rig = Rig(motor if motor.inertia is not None else motor.changed(inertia=1e-5), drive)
+    greatest = _greatest(motor if motor.inertia is not None else motor.changed(inertia=1e-5), drive, turned, level)
+    own = motor.viscous * rate * pi / 2 / motor.teeth
+    return PullOut(rate, greatest[0] - own, degrees(greatest[1]))
+
+
+@lru_cache(maxsize=4096)  # loads that differ have the same curve: a move that is tuned asks for it some ten times
+def _greatest(motor: Motor, drive: Drive, rate: float, level: float) -> tuple[float, float]:
+    """The most torque (Nm) of the currents at `rate` full steps/s, and the load angle (rad) where it is given."""
+    rig = Rig(motor, drive)
     turning = rate * pi / 2
     place_time = drive.winding.pitch / turning
     tau = motor.real_inductance / float(rig.parameters[kernel.R])
@@ -179,8 +188,7 @@ def pull_out(motor: Motor, drive: Drive, rate: float, *, level: float = 1.0) -> 
             outer = low + GOLDEN * (high - low)
             at_outer = torque(outer)
     best = (low + high) / 2
-    own = motor.viscous * asked * pi / 2 / motor.teeth
-    return PullOut(asked, torque(best) - own, degrees(best))
+    return torque(best), best
 
 
 def torque_curve(motor: Motor, drive: Drive, rates: Iterable[float], *, level: float = 1.0) -> list[PullOut]:
