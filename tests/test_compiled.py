@@ -29,21 +29,26 @@ def called(folder: Path, **env: str) -> str:
     ).stdout.strip()  # fmt: skip
 
 
-def test_what_is_on_disk_is_run_without_what_only_compiles(tmp_path: Path) -> None:
-    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-    assert called(tmp_path, **kept) == COMPILED
-    assert called(tmp_path, **kept) == LOADED
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the function and its machine code, which each test here leaves as whole as it was."""
+    folder = tmp_path_factory.mktemp("compiled")
+    assert called(folder, NUMBA_CACHE_DIR=str(folder / "kept")) == COMPILED
+    return folder
+
+
+def test_what_is_on_disk_is_run_without_what_only_compiles(compiled: Path) -> None:
+    assert called(compiled, NUMBA_CACHE_DIR=str(compiled / "kept")) == LOADED
 
 
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
 @pytest.mark.parametrize("broken", [b"", b"\x80\x04 not what it was"], ids=["cut", "garbage"])
-def test_what_is_broken_on_disk_is_made_again(ending: str, broken: bytes, tmp_path: Path) -> None:
-    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-    called(tmp_path, **kept)
-    (file,) = (tmp_path / "kept").rglob(f"*.{ending}")
+def test_what_is_broken_on_disk_is_made_again(ending: str, broken: bytes, compiled: Path) -> None:
+    kept = {"NUMBA_CACHE_DIR": str(compiled / "kept")}
+    (file,) = (compiled / "kept").rglob(f"*.{ending}")
     file.write_bytes(broken)
-    assert called(tmp_path, **kept) == COMPILED
-    assert called(tmp_path, **kept) == LOADED
+    assert called(compiled, **kept) == COMPILED
+    assert called(compiled, **kept) == LOADED
 
 
 def test_where_nothing_can_be_kept_it_is_compiled(tmp_path: Path) -> None:

@@ -111,7 +111,7 @@ def test_the_time_out_of_a_wait_counts_questions_too() -> None:
 class Babbling:
     """A port on which something comes all the time, in virtual time; or what is sent comes back."""
 
-    def __init__(self, noise: Iterator[bytes], *, character: float = 1e-4) -> None:
+    def __init__(self, noise: Iterator[bytes], *, character: float = 1e-3) -> None:
         self.noise, self.character, self.now, self.kept = noise, character, 0.0, b""
 
     def write(self, data: bytes) -> None:
