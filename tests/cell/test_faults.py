@@ -83,6 +83,21 @@ def test_several_faults_share_a_line_and_are_mended_one_by_one() -> None:
     assert answers(made, "V1") == ["V0"]
 
 
+def test_nothing_is_left_of_a_fault_that_was_mended_before_its_time() -> None:
+    made = cell(ONE)
+    made.run_to(SECOND)
+    following = made.next_event()
+    lasting = made.breaks(OnLine(0, CableOut()), 50 * MS)
+    made.breaks(OnLine(0, CableOut()), 60 * MS)
+    made.mend(lasting)
+    assert made.next_event() == SECOND + 60 * MS
+    made.run_to(2 * SECOND)
+    assert not made.faults.standing
+    for _ in range(10):
+        made.mend(made.breaks(OnLine(0, CableOut()), 10**6 * SECOND))
+    assert made.next_event() == following
+
+
 def test_a_stuck_switch_stays_while_the_axis_moves_on_and_is_right_when_mended() -> None:
     made = cell(SLIDE)
     fault = made.breaks(StuckSwitch("sensor", 1))

@@ -12,6 +12,7 @@ from detent.cell.cell import Cell
 from detent.cell.description import parse, single
 from detent.cell.recording import Log
 from detent.realtime import verbs
+from detent.realtime.breaking import MOST
 from detent.realtime.control import Control, Ending
 from detent.realtime.service import Service
 from detent.realtime.verbs import AskedWrongly, Verb
@@ -195,6 +196,22 @@ def test_every_kind_of_fault_is_told_as_it_was_asked_and_is_mended(cell: Control
     assert stuck == ({"UI3"} if fault["where"] == "slide.UI3" else set())
     cell.call("mend", {})
     assert cell.call("faults", {})["faults"] == []
+
+
+def test_only_so_many_faults_stand_at_once_and_those_that_are_over_leave_nothing_behind(cell: Control) -> None:
+    cell.call("pause", {})
+    lasting = {"where": "slide", "kind": "lost", "nth": 10**6, "for": "1000 h"}
+    for _ in range(MOST):
+        cell.call("fault", lasting)
+    with pytest.raises(AskedWrongly, match="100 faults stand; mend some first"):
+        cell.call("fault", lasting)
+    cell.call("mend", {})
+    due = cell.call("state", {})
+    for _ in range(3):
+        cell.call("fault", lasting)
+        cell.call("mend", {})
+    assert cell.call("faults", {})["faults"] == []
+    assert cell.call("state", {}) | {"events": []} == due | {"events": []}
 
 
 def test_every_kind_of_fault_can_be_asked_for() -> None:

@@ -10,7 +10,7 @@ from pydantic import Field
 from starlette.websockets import WebSocketDisconnect
 
 import detent.workbench.live
-from detent.workbench.live import Live
+from detent.workbench.live import MOST_CALLS, Live
 
 
 class Socket:
@@ -174,7 +174,15 @@ def test_a_call_is_answered_with_its_value_or_with_the_reason_why_not(live: Live
     assert found[7]["error"] == "it is gone"
 
 
-@pytest.mark.parametrize("garbage", ["", "{", "[]", "7", '{"call": "add"}', '{"id": "x", "call": "add"}'])
+GARBAGE = [
+    "", "{", "[]", "7", "null", '{"call": "add"}', '{"id": "x", "call": "add"}', "[" * 100_000, '{"a":' * 50_000,
+    '{"id": NaN, "call": "add"}', '{"id": 1e999, "call": "add"}', '{"id": ' + "9" * 5000 + "}",
+    '{"id": 1, "call": "add", "args": 7}',
+]  # fmt: skip
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("garbage", GARBAGE, ids=lambda text: text[:30])
 def test_garbage_from_a_window_is_ignored(live: Live, garbage: str) -> None:
     assert answers(live, garbage, {"id": 1, "call": "add", "args": [1]}) == [{"id": 1, "value": 2}]
 
@@ -220,3 +228,79 @@ def test_a_call_is_offered_once(live: Live) -> None:
 
     with pytest.raises(ValueError, match="already"):
         live.offer("add", add)
+
+
+def test_whatever_a_call_ends_with_is_an_answer_of_a_line(live: Live) -> None:
+    async def fails(how: str) -> None:
+        raise {"assertion": AssertionError("x"), "arithmetic": OverflowError("too large"), "silent": AssertionError(),
+               "long": ValueError("y" * 100_000), "lines": ValueError("a\n" * 100_000)}[how]  # fmt: skip
+
+    live.offer("fails", fails)
+    told_of: list[dict[str, Any]] = []
+
+    async def run() -> list[dict[str, Any]]:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told_of.append(context))
+        hows = ("assertion", "arithmetic", "silent", "long", "lines", 1 << 20, "x" * 100_000)
+        socket = Socket(*({"id": n, "call": "fails", "args": [how]} for n, how in enumerate(hows)))
+        await with_window(live, socket, lambda: socket.until(lambda: len(socket.sent) > len(hows)))
+        return [message for message in socket.sent if "id" in message]
+
+    found = asyncio.run(run())
+    assert [one["error"] for one in sorted(found, key=lambda one: one["id"])[:3]] == [
+        "x",
+        "too large",
+        "AssertionError",
+    ]
+    assert len(found) == 7
+    for one in found:
+        assert len(one["error"]) < 1000, one["id"]
+    assert len(told_of) == 3, "what is no mistake of the person at the window is a fault of ours: it is told"
+
+
+def test_a_window_that_takes_no_answers_is_heard_no_further_and_may_leave(live: Live) -> None:
+    """Neither what it asks nor what it would be answered is kept without a bound."""
+    begun = 0
+
+    async def count() -> str:
+        nonlocal begun
+        begun += 1
+        return "x" * 1000
+
+    live.offer("count", count)
+
+    async def run() -> None:
+        socket = Socket(*({"id": n, "call": "count"} for n in range(5 * MOST_CALLS)))
+        socket.open.clear()
+        serving = asyncio.create_task(live.serve(socket))  # type: ignore[arg-type]
+        for _ in range(20 * MOST_CALLS):
+            await asyncio.sleep(0)
+        assert begun == MOST_CALLS
+        socket.open.set()
+        await socket.until(lambda: begun == 5 * MOST_CALLS)
+        socket.leave.set()
+        await serving
+
+    asyncio.run(run())
+
+
+def test_a_window_that_is_gone_while_its_answers_wait_is_let_go(live: Live) -> None:
+    async def for_ever() -> None:
+        await asyncio.Event().wait()
+
+    live.offer("for_ever", for_ever)
+
+    async def run() -> None:
+        socket = Socket(*({"id": n, "call": "for_ever"} for n in range(2 * MOST_CALLS)))
+        serving = asyncio.create_task(live.serve(socket))  # type: ignore[arg-type]
+        await socket.until(lambda: socket.values().get("windows") == 1)
+
+        async def gone(text: str) -> None:
+            raise WebSocketDisconnect
+
+        socket.send_text = gone  # type: ignore[method-assign]
+        live.put({"now": 12345})
+        socket.leave.set()
+        await serving
+        assert not live.windows
+
+    asyncio.run(run())

@@ -193,6 +193,27 @@ def test_a_trigger_holds_the_view_at_the_last_one_that_fills_it() -> None:
     at(10 * SECOND, story)
 
 
+def test_a_view_that_cannot_be_shown_keeps_no_other_from_the_window() -> None:
+    async def story(bench: Bench, window: Window) -> None:
+        elsewhere = {"source": "a.trace.of.the.cell.before", "edge": "rise"}
+        window.say({"view": {**VIEW, "trigger": elsewhere}})
+        header, _ = await window.frame()
+        assert header["trigger"] is None
+        window.say("")
+
+        def refuse(*_: object) -> ScopeData:
+            raise ValueError("there is nothing to show")
+
+        bench.scope, shown = refuse, bench.scope  # type: ignore[method-assign]
+        window.say({"view": VIEW})
+        assert await window.news() == {"error": "there is nothing to show"}
+        bench.scope = shown  # type: ignore[method-assign]
+        window.say({"view": VIEW})
+        await window.frame()
+
+    at(100 * SECOND, story)
+
+
 @pytest.mark.parametrize(("direction", "found"), [(1, 4.5), (-1, 3.5)])
 def test_the_nearest_trigger_is_found_either_way(direction: int, found: float) -> None:
     async def story(bench: Bench, window: Window) -> None:

@@ -392,6 +392,7 @@ class Cell:
         if not self._acting:
             self._catch_up()
         self.faults.mend(fault)
+        self._withdraw(Mend(fault))
         self._keep(Mend(fault))
 
     def _line(self, line: int) -> Line:
@@ -422,6 +423,14 @@ class Cell:
         place = bisect_left(left, action.at, key=lambda other: other.at)
         self._script, self._next_action = Script((*left[:place], action, *left[place:])), 0
         self._note_next_action()
+
+    def _withdraw(self, action: Action) -> None:
+        """What was to come by itself is done already."""
+        left = self._script[self._next_action :]
+        if any(coming.what == action and not coming.outside for coming in left):
+            left = Script(coming for coming in left if coming.outside or coming.what != action)
+            self._script, self._next_action = Script(left), 0
+            self._note_next_action()
 
     # -- looking -----------------------------------------------------------------------------------------
 

@@ -20,8 +20,15 @@ _ON_LINES: Final[Mapping[str, type[BitErrors | LostCharacters | Delay | CableOut
 }
 
 
+MOST: Final = 100
+"""Faults that stand at once: each takes its time with every character of its line."""
+
+
 def fault_of(names: Names, given: Mapping[str, object]) -> Fault:
     """The fault that is meant by the arguments of the verb `fault`. Raises AskedWrongly."""
+    standing = names.cell.faults.standing
+    if len(standing) >= MOST:
+        raise AskedWrongly(f"{len(standing)} faults stand", "mend some first")
     kind, where = str(given["kind"]), str(given["where"])
     if kind not in verbs.FAULTS:
         raise verbs.unknown("kind of fault", kind, tuple(verbs.FAULTS))

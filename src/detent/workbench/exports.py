@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from detent.outputs.signals import Signals
-from detent.ticks import Ns
-from detent.workbench.scope import Scope, Trace
+from detent.workbench.scope import ScopeData, Trace
 
 KINDS: Final = ("vcd", "sr", "npz", "csv")
 CSV_ROWS: Final = 20_000  # columns of time, at most
@@ -28,9 +27,8 @@ def whole(kind: str, signals: Signals) -> bytes:
         return path.read_bytes()
 
 
-def table(scope: Scope, traces: Sequence[Trace], begin: Ns, end: Ns) -> bytes:
+def table(traces: Sequence[Trace], data: ScopeData) -> bytes:
     """Rows of time and values. Within a row's time a trace went from its least to its most: two columns for each."""
-    data = scope.columns([trace.key for trace in traces], begin, end, CSV_ROWS, begin)
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     heads = [f"{trace.key} {what}{f' [{trace.measure}]' if trace.measure else ''}"

@@ -4,18 +4,20 @@ One socket a window (`/live`). The server pushes what changed since it pushed la
 a window that is slow gets fewer and newer values, never a queue. It hears something every `BEAT` seconds, if only
 ``{}``: so a window knows a server that hangs from a cell that stands. A window calls
 ``{"call": NAME, "args": [...], "id": N}`` and gets ``{"id": N, "value": ...}`` or ``{"id": N, "error": TEXT}``.
+A window that takes no answers is heard no further than `MOST_CALLS` calls.
 """
 
 import asyncio
 import contextlib
 import json
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 from pydantic import ValidationError, validate_call
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from detent.hosts.errors import told
+from detent.one_line import one_line
 
 Value: TypeAlias = "str | int | float | bool | Sequence[Value] | Mapping[str, Value] | None"
 Call: TypeAlias = Callable[..., Awaitable[object]]
@@ -23,6 +25,8 @@ Call: TypeAlias = Callable[..., Awaitable[object]]
 MISTAKES = (ValueError, KeyError, TypeError, OSError, RuntimeError)  # whose text is for the person at the window
 LONGEST_CALL = 1 << 20  # characters
 BEAT = 1.0  # seconds
+MOST_CALLS: Final = 100  # of a window at once; an answer that it has not taken counts
+MOST_LINES: Final = 100  # of an error
 
 
 class Live:
@@ -70,13 +74,7 @@ class Live:
         self.put({"windows": self.windows})
         sender = asyncio.create_task(window.send())
         try:
-            while True:
-                text = await socket.receive_text()
-                if len(text) > LONGEST_CALL:
-                    break
-                answer = asyncio.create_task(self._answer(window, text))
-                self._answers.add(answer)
-                answer.add_done_callback(self._answers.discard)
+            await self._hear(window, socket, sender)
         except (WebSocketDisconnect, RuntimeError, KeyError):  # gone, or it sent what is no text
             pass
         finally:
@@ -86,24 +84,44 @@ class Live:
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await socket.close()
 
+    async def _hear(self, window: "_Window", socket: WebSocket, sender: asyncio.Task[None]) -> None:
+        """Begin what a window calls, `MOST_CALLS` at once. Raises what ends its socket."""
+        asked: set[asyncio.Task[None]] = set()
+        while len(text := await socket.receive_text()) <= LONGEST_CALL:
+            answer = asyncio.create_task(self._answer(window, text))
+            for under_way in (self._answers, asked):
+                under_way.add(answer)
+                answer.add_done_callback(under_way.discard)
+            while len(asked) >= MOST_CALLS and not sender.done():
+                await asyncio.wait({sender, *asked}, return_when=asyncio.FIRST_COMPLETED)
+
     async def _answer(self, window: "_Window", text: str) -> None:
-        """Carry out a call, tell its window what came of it."""
+        """Carry out a call, tell its window what came of it; done when the window has taken that, or has left."""
         try:
             asked = json.loads(text)
             number, name, arguments = int(asked["id"]), str(asked["call"]), list(asked.get("args", ()))
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
             return  # nobody who waits for an answer
         try:
             call = self._calls.get(name)
             if call is None:
                 raise ValueError(f"there is no call {name!r}")
-            window.reply({"id": number, "value": await call(*arguments)})
-        except ValidationError as error:
-            first = error.errors()[0]
-            window.reply({"id": number, "error": f"{name}: {first['msg']} (it is {first.get('input')!r})"})
-        except MISTAKES as error:
-            words = error.args[0] if isinstance(error, KeyError) and error.args else told(error)
-            window.reply({"id": number, "error": str(words) or type(error).__name__})
+            answer: dict[str, object] = {"id": number, "value": await call(*arguments)}
+        except Exception as error:  # whatever it is: somebody waits for the answer
+            answer = {"id": number, "error": _in_words(name, error)}
+            if not isinstance(error, MISTAKES):
+                told_of = {"message": f"The call {name} failed", "exception": error}
+                asyncio.get_running_loop().call_exception_handler(told_of)
+        await window.reply(answer)
+
+
+def _in_words(name: str, error: Exception) -> str:
+    """Why a call was not carried out, for the person at the window."""
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        return one_line(f"{name}: {first['msg']} (it is {first.get('input')!r})")
+    words = str(error.args[0] if isinstance(error, KeyError) and error.args else told(error))
+    return "\n".join(map(one_line, words.splitlines()[:MOST_LINES])) or type(error).__name__
 
 
 class _Window:
@@ -112,34 +130,45 @@ class _Window:
     def __init__(self, socket: WebSocket) -> None:
         self._socket = socket
         self._values: dict[str, Value] = {}
-        self._replies: list[dict[str, object]] = []
+        self._replies: list[tuple[dict[str, object], asyncio.Event]] = []
         self._work = asyncio.Event()
+        self._gone = False
 
     def show(self, values: Mapping[str, Value]) -> None:
         """Send these values soon; values of the same keys that still wait are left out."""
         self._values.update(values)
         self._work.set()
 
-    def reply(self, answer: dict[str, object]) -> None:
-        """Send the answer to a call."""
-        self._replies.append(answer)
-        self._work.set()
+    async def reply(self, answer: dict[str, object]) -> None:
+        """Send the answer to a call; until it has gone, or the window has."""
+        if not self._gone:
+            taken = asyncio.Event()
+            self._replies.append((answer, taken))
+            self._work.set()
+            await taken.wait()
 
     async def send(self) -> None:
-        """Send what there is, for ever."""
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-            while True:
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(BEAT):
-                        await self._work.wait()
-                self._work.clear()
-                values, self._values = self._values, {}
-                replies, self._replies = self._replies, []
-                if values or not replies:
-                    told = {"set": values} if values else {}
-                    await self._socket.send_text(json.dumps(told, separators=(",", ":")))
-                for answer in replies:
-                    await self._socket.send_text(json.dumps(answer, separators=(",", ":"), default=_plain))
+        """Send what there is, until the window has gone."""
+        under_way: list[tuple[dict[str, object], asyncio.Event]] = []
+        try:
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+                while True:
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(BEAT):
+                            await self._work.wait()
+                    self._work.clear()
+                    values, self._values = self._values, {}
+                    under_way, self._replies = self._replies, []
+                    if values or not under_way:
+                        told = {"set": values} if values else {}
+                        await self._socket.send_text(json.dumps(told, separators=(",", ":")))
+                    for answer, taken in under_way:
+                        await self._socket.send_text(json.dumps(answer, separators=(",", ":"), default=_plain))
+                        taken.set()
+        finally:
+            self._gone = True
+            for _, taken in (*under_way, *self._replies):
+                taken.set()
 
 
 def _plain(value: object) -> object:

@@ -180,8 +180,13 @@ class Feed:
                 self._stale.clear()
                 if self._view is None:
                     continue
+                try:
+                    packed_frame = self._frame(self._view)
+                except MISTAKES as error:  # of this view: the window may ask for another
+                    await self._wrong(str(error))
+                    continue
                 self._painted.clear()
-                await self._socket.send_bytes(self._frame(self._view))
+                await self._socket.send_bytes(packed_frame)
                 await asyncio.sleep(FRAME)
 
     async def _tell_traces(self) -> None:
@@ -235,6 +240,8 @@ class Feed:
 
     def _last_trigger(self, wanted: TriggerCondition, span: Ns) -> Ns | None:
         """Where the trigger was met last, so long ago that what follows fills the view."""
+        if wanted.source != "error" and wanted.source not in self._traces:
+            return None  # of a cell that was shown before
         state, cut = self._bench.state, self._bench.cut
         until = state.now - round(span * (1 - BEFORE))
         if self._searched is None or self._searched[:2] != (wanted, cut) or self._searched[2] > until:
