@@ -1,8 +1,11 @@
 """TOML is read in time that grows with the text, and refused in a line of words."""
 
 import contextlib
+import tomllib
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from tests.test_assembler_bounds import lines_executed
 
 from detent import toml
@@ -47,3 +50,11 @@ def test_an_error_is_a_line(text: str, words: str) -> None:
         toml.loads(text)
     assert len(str(raised.value)) < 700
     assert "\n" not in str(raised.value)
+
+
+@given(st.text())
+def test_every_text_is_read_as_it_was_written(text: str) -> None:
+    line = toml.written(text)
+    assert tomllib.loads(f"x = {line}")["x"] == text
+    assert "\n" not in line
+    assert "\r" not in line

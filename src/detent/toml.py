@@ -4,6 +4,7 @@ Python's reader takes time that grows with the square of the parts of a dotted k
 what is nested too deeply or has too many digits.
 """
 
+import json
 import re
 import tomllib
 from typing import Any, Final
@@ -42,3 +43,8 @@ def loads(text: str) -> dict[str, Any]:
         raise NoToml(
             f"it has a number of thousands of digits{place}: no number that is meant here is so long"
         ) from None
+
+
+def written(text: str) -> str:
+    """A text as TOML has it, in quotes and on a line. JSON's escapes are TOML's, but for what lies beyond 16 bits."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -15,6 +15,7 @@ from detent.cell.host import HostPort
 from detent.hosts.dcb274 import BlockingDcb274, Dcb274
 from detent.hosts.errors import DriverError, NoAnswer
 from detent.hosts.exchange import Ask, Steps
+from detent.ticks import SECOND
 
 ESC = b"\x1b"
 REST = 8.0  # seconds: every ramp here is over by then
@@ -119,5 +120,7 @@ def test_a_stop_at_any_time_after_that_too(moves: str, does: str, later: float) 
 def test_a_stop_that_nobody_hears_is_an_error(moves: str) -> None:
     cell, _, unit = begun(moves)
     cell.power("unit", False)
+    began = cell.now
     with pytest.raises(NoAnswer, match="does not take its stop command"):
         unit.stop()
+    assert cell.now - began < 2.5 * SECOND, "it took lines when it was last heard: this is no ramp out of a program"

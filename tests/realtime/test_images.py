@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from detent.realtime import belonging
 from detent.realtime import images as module
 from detent.realtime.images import (
     Images,
@@ -17,6 +18,7 @@ from detent.realtime.images import (
     pack,
     unpack,
 )
+from detent.realtime.system import lock
 
 IMAGE = bytes(range(119))
 MODELS = {"bar": "gs-c200", "drill": "gs-c200s"}
@@ -230,6 +232,31 @@ def test_a_cell_that_is_moved_or_renamed_finds_its_images_again(cell: Path, tmp_
         assert found == {"u": IMAGE}
         assert len(reports) == said
     assert f'path = "{new}"' in (tmp_path / "state" / "mm.cell").read_text()
+
+
+def test_a_process_that_stands_still_with_the_lock_is_not_waited_for_without_an_end(
+    cell: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(belonging, "PATIENCE", 0.0)
+    with open(tmp_path / "state" / "cells.lock") as other:
+        lock(other.fileno())
+        with pytest.raises(ImagesUnusable, match=r"another process has .*cells.lock and does not let go of it; choose"):
+            opened(tmp_path / "state", cell)
+    assert opened(tmp_path / "state", cell)[2] == {"u": IMAGE}
+
+
+ODD = ["a b", 'a"b', "a\\b", "a\nb", "a\x7fb", "\u00e9", "\u2028", "\U0001f600", "\udcff", "#", "'", "\x1b[2J"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="names of files are bytes on POSIX alone")
+@pytest.mark.parametrize("name", ODD, ids=ascii)
+def test_a_cell_finds_its_images_again_whatever_its_folder_is_called(tmp_path: Path, name: str) -> None:
+    file = tmp_path / name / "mm.toml"
+    file.parent.mkdir()
+    file.write_text("x")
+    images, _, _ = opened(tmp_path / "state", file)
+    assert images.save("u", IMAGE)
+    assert opened(tmp_path / "state", file)[1:] == ([], {"u": IMAGE})
 
 
 def test_a_cell_that_is_moved_by_copying_finds_them_by_its_name_and_its_units(cell: Path, tmp_path: Path) -> None:

@@ -6,9 +6,9 @@ the units with their models. People may edit it.
 """
 
 import hashlib
-import json
 import os
 import re
+import time
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -19,8 +19,10 @@ from typing import NamedTuple
 from detent.controllers.catalogue import MODELS
 from detent.realtime.kept import read_kept
 from detent.realtime.system import NO_LINK, lock
+from detent.toml import written
 
 SUFFIX = ".eeprom"
+PATIENCE = 5.0  # seconds for another process that looks for a name, which takes milliseconds
 _MOST_KEY = 1 << 20  # bytes of a NAME.cell
 _HEAD = "# Whose EEPROM images these are: the files of this name with .UNIT.eeprom. Cell moved: its path here.\n"
 
@@ -67,11 +69,20 @@ def claim(folder: Path, target: str, models: Mapping[str, str], *, is_file: bool
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """No other process looks for a name meanwhile."""
+    """No other process looks for a name meanwhile. One that stands still is waited for as long as `PATIENCE`."""
     flags = os.O_RDWR | os.O_CREAT | NO_LINK
     descriptor = os.open(folder / "cells.lock", flags, 0o666)
+    until = time.monotonic() + PATIENCE
     try:
-        lock(descriptor, wait=True)
+        while True:
+            try:
+                lock(descriptor)
+                break
+            except BlockingIOError as error:
+                if time.monotonic() >= until:
+                    told = f"another process has {folder / 'cells.lock'} and does not let go of it"
+                    raise BlockingIOError(error.errno, told) from None
+            time.sleep(0.02)
         yield
     finally:
         os.close(descriptor)
@@ -135,17 +146,23 @@ def _keys(folder: Path) -> Iterator[Key]:
     """Every `NAME.cell` that can be read."""
     for place in sorted(folder.glob("*.cell")):
         try:
-            facts = tomllib.loads(read_kept(place, _MOST_KEY).decode())
+            facts = tomllib.loads(_decoded(read_kept(place, _MOST_KEY)))
             yield Key(place.name.removesuffix(".cell"), str(facts["path"]), str(facts["file"]), str(facts["units"]))
         except (OSError, ValueError, KeyError, RecursionError):
             continue
 
 
+def _decoded(data: bytes) -> str:
+    """A path is any bytes: those that are no UTF-8 are kept as Python keeps them in names of files."""
+    return data.decode("utf-8", "surrogateescape")
+
+
 def _write_key(folder: Path, key: Key) -> None:
     place = folder / f"{key.name}.cell"
-    text = _HEAD + "".join(f"{name} = {json.dumps(value)}\n" for name, value in key._asdict().items() if name != "name")
-    with suppress(OSError, UnicodeDecodeError):
-        if read_kept(place, _MOST_KEY).decode() == text:
+    facts = key._asdict().items()
+    text = _HEAD + "".join(f"{name} = {written(value)}\n" for name, value in facts if name != "name")
+    with suppress(OSError):
+        if _decoded(read_kept(place, _MOST_KEY)) == text:
             return
     temporary = place.with_name(f"{place.name}.new")
     temporary.unlink(missing_ok=True)

@@ -41,13 +41,13 @@ NO_WAIT: Final[int] = getattr(os, "O_NONBLOCK", 0)
 """How files are opened that may turn out to be none."""
 
 
-def lock(descriptor: int, *, wait: bool = False) -> None:
+def lock(descriptor: int) -> None:
     """Have an open file for this process alone, until it is closed; where the system has no such locks, in name only.
 
-    BlockingIOError if another process has it, unless it is waited for; OSError if the file cannot be locked.
+    BlockingIOError if another process has it; OSError if the file cannot be locked.
     """
     if fcntl is not None:
-        fcntl.flock(descriptor, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def reuse_address(listener: socket.socket) -> None:

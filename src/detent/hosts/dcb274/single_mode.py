@@ -20,7 +20,7 @@ from detent.hosts.errors import ECHOES, BadAnswer, NoAnswer, Refused, Spoken
 from detent.hosts.exchange import Ask, Clear, Steps, attempt, length, until
 
 STOP_TRIES: Final = 20  # to give the stop command: a unit that ramps down out of a program takes no line meanwhile
-BABBLES: Final = 6  # times the patience: so long it is tried where something else comes, too, as no unit ramps down so
+SOON: Final = 6  # of them where something else comes, as no unit ramps down so, or where no program is known to run
 
 
 class SingleMode(Handshake):
@@ -129,16 +129,18 @@ class SingleMode(Handshake):
         whether lines are stored. SPACE would not do: a unit with a command that waits does not answer it. Without it
         `signed_on` a unit may wait for just that, which is seen behind the first ``@``.
 
-        A unit that ramps down says nothing. So where other things come again and again the line babbles: that is told
-        soon, and a silence only when it is longer than a ramp.
+        A unit that ramps down out of a program says nothing. So where other things come again and again the line
+        babbles: that is told soon. So is a silence of a unit that took lines when it was last heard; of any other only
+        when it is longer than a usual ramp.
         """
         heard, wrong, others, began, sure = b"", 0, 0, None, known
+        silence = SOON if known and not self.running else STOP_TRIES
         asked = not signed_on
         for _ in range(STOP_TRIES):
             yield Clear()
             answer = yield Ask(b"@", until(b"@"), self.patience)
             began = answer.at if began is None else began
-            if others > TRIES or answer.at > began + (BABBLES if others or wrong else STOP_TRIES) * self.patience:
+            if others > TRIES or answer.at > began + (SOON if others or wrong else silence) * self.patience:
                 break
             if not answer.whole:
                 heard = answer.data.replace(b"#\r\n", b"")
@@ -170,7 +172,7 @@ class SingleMode(Handshake):
             raise BadAnswer(self.title, what, spoken, "abort() sends ESC")
         if not asked and (yield from self.signs_on()):
             raise NoAnswer(self.title, RESET, spoken)
-        what = "does not take its stop command: it is off, or the line is broken"
+        what = "does not take its stop command: it is off, the line is broken, or it ramps down out of a program"
         raise NoAnswer(self.title, what, spoken, "abort() sends ESC")
 
     def _end_program_mode(self) -> Steps[None]:
