@@ -89,9 +89,11 @@ def live() -> Live:
         return a + b
 
     async def fail(kind: str) -> None:
-        raise {"key": KeyError("no unit 'x'"), "file": OSError(2, "No such file"), "run": RuntimeError("it is gone")}[
-            kind
-        ]
+        raise {
+            "key": KeyError("no unit 'x'"),
+            "file": OSError(2, "No such file", "a/b"),
+            "run": RuntimeError("it is gone"),
+        }[kind]
 
     made.offer("add", add)
     made.offer("fail", fail)
@@ -170,8 +172,14 @@ def test_a_call_is_answered_with_its_value_or_with_the_reason_why_not(live: Live
     assert "add: " in found[3]["error"]
     assert found[4]["error"] == "there is no call 'sing'"
     assert found[5]["error"] == "no unit 'x'"
-    assert "No such file" in found[6]["error"]
+    assert found[6]["error"] == "a/b: No such file"
     assert found[7]["error"] == "it is gone"
+
+
+@pytest.mark.parametrize("given", ["x" * 100_000, 10**400, ["x"] * 50_000], ids=["text", "number", "list"])
+def test_an_error_quotes_no_more_of_a_call_than_a_person_reads(live: Live, given: object) -> None:
+    (answer,) = answers(live, {"id": 1, "call": "add", "args": [1, given]})
+    assert len(answer["error"]) < 700
 
 
 GARBAGE = [

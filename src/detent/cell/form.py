@@ -61,8 +61,9 @@ def adapter(kind: type[Kind]) -> TypeAdapter[Kind]:
     """What checks values of `kind`, made once. Its fields may name kinds of values without importing them."""
     made = _adapters.get(kind)
     if made is None:
-        made = _adapters[kind] = TypeAdapter(kind)
+        made = TypeAdapter(kind)
         made.rebuild(_types_namespace=_NAMES)
+        _adapters[kind] = made  # not before it is ready: another thread may read a file meanwhile
     return made
 
 

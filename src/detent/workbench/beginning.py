@@ -117,7 +117,7 @@ class Beginning:
         """Write a new cell into the folder, never over a file unless `over` says so. Returns its name."""
         name = name if name.endswith(".toml") else f"{name}.toml"
         text = await asyncio.to_thread(cell.text, self._beside(name))
-        if self._folder.path(name).exists() and not over:
+        if self._folder.path(name).is_file() and not over:
             raise FileExistsError(f"{name} is there already: give it another name, or say that it may be replaced")
         self._folder.write(name, text.encode())
         return name

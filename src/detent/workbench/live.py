@@ -120,6 +120,8 @@ def _in_words(name: str, error: Exception) -> str:
     if isinstance(error, ValidationError):
         first = error.errors()[0]
         return one_line(f"{name}: {first['msg']} (it is {first.get('input')!r})")
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        return one_line(f"{error.filename}: {error.strerror}")
     words = str(error.args[0] if isinstance(error, KeyError) and error.args else told(error))
     return "\n".join(map(one_line, words.splitlines()[:MOST_LINES])) or type(error).__name__
 

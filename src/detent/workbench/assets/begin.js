@@ -6,6 +6,7 @@ import { wordsOf } from "./forms.js";
 const { part, call, toast, failed, remembered, remember } = window.detent;
 
 const AGAIN = 2000; // ms
+const ARMED = 9000; // ms in which a second click is a yes: as long as the question is seen
 
 part("begin", (box) => {
   /** @param {string} name */
@@ -100,6 +101,7 @@ part("begin", (box) => {
   const hint = (text) => (role("hint").textContent = text);
 
   function draw() {
+    armed = ""; // what was asked about is another cell
     remember("newcell", JSON.stringify(cell));
     const wires = new Map();
     for (const { source, target } of cell.wires) wires.set(source, [...(wires.get(source) || []), target]);
@@ -346,6 +348,7 @@ part("begin", (box) => {
     } catch (error) {
       toast(/there already/.test(wordsOf(error)) ? `${name} is there already. Click once more to replace it.` : wordsOf(error), "error");
       armed = /there already/.test(wordsOf(error)) ? name : "";
+      setTimeout(() => (armed = ""), ARMED);
       return "";
     }
   }

@@ -140,6 +140,7 @@ export class Tuning {
       : "";
     const known = [
       found.complete ? "" : "Stopped: the best so far, which nothing has proved yet. ",
+      found.commands.length ? "" : `No setting is sent for it: ${found.option_lines.length ? "its options are burnt into the drive's EPROM, or stand in the cell file; " : ""}what a move needs is said with it, under "sent as". `,
       `${found.check.words[0].toUpperCase()}${found.check.words.slice(1)}. `,
       hand,
       Number.isFinite(found.ratio) ? `It takes ${found.ratio.toFixed(2)} times what torque allows at its worst. ` : "",
