@@ -11,16 +11,14 @@ from detent import extras
 
 
 class Installed:
-    """A distribution as `importlib.metadata` shows it: of an editable checkout, or of a wheel."""
+    """A distribution as `importlib.metadata` shows it, with what its installer wrote of where it came from."""
 
-    def __init__(self, sources: Path | None) -> None:
-        self.sources = sources
+    def __init__(self, origin: object = None) -> None:
+        self.origin = origin
 
     def read_text(self, name: str) -> str | None:
         assert name == "direct_url.json"
-        if self.sources is None:
-            return None
-        return json.dumps({"url": self.sources.as_uri(), "dir_info": {"editable": True}})
+        return None if self.origin is None else json.dumps(self.origin)
 
 
 @pytest.fixture
@@ -28,7 +26,7 @@ def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An environment of a wheel, with a pip of its own; tests make it what they need."""
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(tmp_path / "bin" / "python"))
-    monkeypatch.setattr("importlib.metadata.distribution", lambda name: Installed(None))
+    monkeypatch.setattr("importlib.metadata.distribution", lambda name: Installed())
     monkeypatch.setattr(extras, "find_spec", lambda name: object())
     return tmp_path
 
@@ -57,10 +55,36 @@ def test_a_tool_of_uv_or_pipx_is_installed_anew_with_the_extras_that_it_has(
     assert extras.how_to_install() == "uv tool install --force detent-motion"
 
 
+@pytest.mark.parametrize(
+    ("origin", "place"),
+    [
+        ({"url": "file:///a%20b/x.whl", "archive_info": {"hash": "sha256=0"}}, "file:///a%20b/x.whl"),
+        ({"url": "file:///sources", "dir_info": {}}, "file:///sources"),
+        (
+            {"url": "https://example.org/detent", "vcs_info": {"vcs": "git", "commit_id": "0a1b"}},
+            "git+https://example.org/detent@0a1b",
+        ),
+    ],
+)
+def test_a_tool_that_came_from_elsewhere_is_installed_from_there(
+    origin: object, place: str, prefix: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An index may have no such distribution, or somebody else's."""
+    monkeypatch.setattr(extras, "installed", lambda name: False)
+    monkeypatch.setattr("importlib.metadata.distribution", lambda name: Installed(origin))
+    assert extras.how_to_install("fast").endswith("-m pip install 'detent-motion[fast]'")  # what is there stays
+    (prefix / "pipx_metadata.json").touch()
+    assert extras.how_to_install("fast") == f"pipx install --force 'detent-motion[fast] @ {place}'"
+    (prefix / "uv-receipt.toml").touch()
+    assert extras.how_to_install("fast") == f"uv tool install --force 'detent-motion[fast] @ {place}'"
+    assert extras.how_to_install() == f"uv tool install --force 'detent-motion @ {place}'"
+
+
 def test_a_checkout_is_set_up_again(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sources = prefix / "with a blank"
     sources.mkdir()
-    monkeypatch.setattr("importlib.metadata.distribution", lambda name: Installed(sources))
+    told = {"url": sources.as_uri(), "dir_info": {"editable": True}}
+    monkeypatch.setattr("importlib.metadata.distribution", lambda name: Installed(told))
     assert extras.how_to_install("workbench") == f"{prefix}/bin/python -m pip install -e '{sources}[workbench]'"
     (sources / "Makefile").touch()
     assert extras.how_to_install("workbench") == f"make -B -C '{sources}' setup"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from typing import Any
 
 DISTRIBUTION = "detent-motion"
 
@@ -44,24 +45,26 @@ def need(extra: str, what: str) -> None:
 def how_to_install(extra: str = "") -> str:
     """The command that adds `extra` to this installation, or repairs it: a checkout, uv tool, pipx, an environment.
 
-    A tool is installed anew as a whole, so the extras that it has are named again.
+    A tool is installed anew as a whole, so the extras that it has are named again, and the place that it came from: the
+    package index may not have it, or have another version.
     """
     import shlex  # these take longer to load than most of what Detent needs at every start
     from pathlib import Path
 
     wanted = f"'{DISTRIBUTION}[{extra}]'" if extra else DISTRIBUTION
     prefix = Path(sys.prefix)
-    sources = _sources()
+    origin = _origin()
+    sources = _folder(origin) if origin.get("dir_info", {}).get("editable") else None
     if sources is not None and (sources / "Makefile").is_file():
         return f"make -B -C {shlex.quote(str(sources))} setup"
     if sources is not None:
         return f"{_pip()} -e '{sources}[{extra}]'" if extra else f"{_pip()} -e {sources}"
     whole = ",".join(sorted({name for name in EXTRAS if installed(name)} | ({extra} if extra else set())))
-    tool = f"'{DISTRIBUTION}[{whole}]'" if whole else DISTRIBUTION
+    tool = (f"{DISTRIBUTION}[{whole}]" if whole else DISTRIBUTION) + _from_there(origin)
     if (prefix / "uv-receipt.toml").is_file():
-        return f"uv tool install --force {tool}"
+        return f"uv tool install --force {shlex.quote(tool)}"
     if (prefix / "pipx_metadata.json").is_file():
-        return f"pipx install --force {tool}"
+        return f"pipx install --force {shlex.quote(tool)}"
     return f"{_pip()} {wanted}"
 
 
@@ -70,18 +73,30 @@ def _pip() -> str:
     return f"{sys.executable} -m pip install" if find_spec("pip") else f"uv pip install --python {sys.executable}"
 
 
-def _sources() -> "Path | None":
-    """The folder of the sources, where Detent is installed from one that can be edited."""
+def _origin() -> "dict[str, Any]":
+    """Where Detent was installed from, as installers write it down (`direct_url.json`); nothing: from an index."""
     import json
     from importlib.metadata import PackageNotFoundError, distribution
+
+    try:
+        told: dict[str, Any] = json.loads(distribution(DISTRIBUTION).read_text("direct_url.json") or "{}")
+    except PackageNotFoundError:
+        return {}
+    return told
+
+
+def _folder(origin: "dict[str, Any]") -> "Path":
+    """The folder of the sources, where Detent was installed from one."""
     from pathlib import Path
     from urllib.parse import urlsplit
     from urllib.request import url2pathname
 
-    try:
-        told = json.loads(distribution(DISTRIBUTION).read_text("direct_url.json") or "{}")
-    except PackageNotFoundError:
-        return None
-    if not told.get("dir_info", {}).get("editable"):
-        return None
-    return Path(url2pathname(urlsplit(told["url"]).path))
+    return Path(url2pathname(urlsplit(origin["url"]).path))
+
+
+def _from_there(origin: "dict[str, Any]") -> str:
+    """What a requirement says of its place: a file, a folder, a repository at the commit that is installed."""
+    if not origin:
+        return ""
+    version = origin.get("vcs_info")
+    return f" @ {version['vcs']}+{origin['url']}@{version['commit_id']}" if version else f" @ {origin['url']}"
