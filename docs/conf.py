@@ -11,6 +11,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode"]
 exclude_patterns = ["_build"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 nitpicky = False
+smartquotes = False  # an option has two hyphens, and its quotes are typed
 suppress_warnings = ["myst.strikethrough"]
 
 myst_heading_anchors = 4

@@ -36,6 +36,17 @@ def test_every_page_is_there(site: Path) -> None:
             assert (site / page.relative_to(ROOT / "docs")).with_suffix(".html").is_file(), page
 
 
+def test_what_is_typed_can_be_copied_as_it_stands(site: Path) -> None:
+    """Two hyphens of an option are no dash, and quotes are those of the keyboard."""
+    for page in (ROOT / "docs").rglob("*.md"):
+        if "_build" not in page.parts and "decisions" not in page.parts:
+            source, made = page.read_text(), (site / page.relative_to(ROOT / "docs")).with_suffix(".html").read_text()
+            body = made[made.index("<article") : made.index("</article>")]
+            assert [sign for sign in "\u2013\u201c\u201d\u2018\u2019" if sign in body and sign not in source] == [], (
+                page
+            )
+
+
 def test_nothing_is_loaded_from_elsewhere(site: Path) -> None:
     loads = re.compile(r"<(?:script|img|iframe|source)[^>]* src=\"(?:https?:)?//|<link[^>]* href=\"(?:https?:)?//")
     for page in site.rglob("*.html"):

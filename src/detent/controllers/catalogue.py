@@ -257,7 +257,8 @@ def _gsc200(name: str, options: tuple[Option, ...]) -> Model:
         lambda: gsc200_commands.reference(name),
         gsc200_pins.strap_line,
         limits=Limits(gsc200_pins.SUPPLY_V, gsc200_pins.LOADS_A),
-        by_hand="To type by hand, strap the checksum off: CHS=low. Lines end with CR (Ctrl-M, or Enter in picocom).",
+        by_hand="To type by hand, strap the checksum off: CHS=low. Lines end with CR (Ctrl-M, or Enter in picocom).\n"
+        "picocom needs --echo --imap crcrlf as well: nothing is echoed, and answers end with CR alone.",
         saves=gsc200_commands.Op.MEMORY.value,
         phrases=lambda straps: GsC200Phrases(name, straps),
     )
