@@ -13,7 +13,7 @@ import numpy as np
 
 from bench.rows import Row, measure
 from detent.motors import kernel
-from detent.motors.curve import torque_curve
+from detent.motors.curve import greatest, torque_curve
 from detent.motors.damping import UNDAMPED
 from detent.motors.drive import Drive
 from detent.motors.load import Load
@@ -103,7 +103,12 @@ def rows() -> list[Row]:
     env = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     subprocess.run(command, check=True, capture_output=True, env=env)
     first = float(subprocess.run(command, check=True, capture_output=True, text=True, env=env).stdout)
-    curve = measure(partial(torque_curve, one.motor, one.drive, [250 * k for k in range(1, 12)]))
+
+    def curve_anew() -> None:
+        greatest.cache_clear()
+        torque_curve(one.motor, one.drive, [250 * k for k in range(1, 12)])
+
+    curve = measure(curve_anew)
     scipy = "scipy LSODA rtol 1e-5, s/s"
     return [
         Row("one motor, simulated s", single, "s/s", scipy, baseline, 500 * baseline),

@@ -24,7 +24,8 @@ from detent.ticks import SECOND
 
 Floats = npt.NDArray[np.float64]
 
-ANGLES = 37  # looked at in the half turn where the greatest torque lies, before the golden section
+ANGLES = 37  # of a turn, of which some are looked at before the golden section
+LIKELY = range(7, 21)  # of these: 68 to 195 degrees
 GOLDEN = 0.6180339887498949
 PRECISION = 1e-3  # rad, of the load angle
 LEAST_RATE, MOST_RATE = 0.01, 1e6  # full steps/s: within these a step motor turns
@@ -144,13 +145,13 @@ def pull_out(motor: Motor, drive: Drive, rate: float, *, level: float = 1.0) -> 
     check_rate(rate)
     turned = max(rate, min(STANDING, 0.006 * motor.resistance / motor.real_inductance))
     # an inertia is not needed here, and not every maker gives one
-    greatest = _greatest(motor if motor.inertia is not None else motor.changed(inertia=1e-5), drive, turned, level)
+    torque, angle = greatest(motor if motor.inertia is not None else motor.changed(inertia=1e-5), drive, turned, level)
     own = motor.viscous * rate * pi / 2 / motor.teeth
-    return PullOut(rate, greatest[0] - own, degrees(greatest[1]))
+    return PullOut(rate, torque - own, degrees(angle))
 
 
 @lru_cache(maxsize=4096)  # loads that differ have the same curve: a move that is tuned asks for it some ten times
-def _greatest(motor: Motor, drive: Drive, rate: float, level: float) -> tuple[float, float]:
+def greatest(motor: Motor, drive: Drive, rate: float, level: float) -> tuple[float, float]:
     """The most torque (Nm) of the currents at `rate` full steps/s, and the load angle (rad) where it is given."""
     rig = Rig(motor, drive)
     turning = rate * pi / 2
@@ -172,10 +173,12 @@ def _greatest(motor: Motor, drive: Drive, rate: float, level: float) -> tuple[fl
                              per_place, flat)  # fmt: skip
         return value
 
-    # the greatest torque lies between 90 degrees and 180, but a look at the whole turn is cheap
+    # the greatest torque lies between 90 degrees and 180; at an end of what is likely, it is looked for everywhere
     step = 2 * pi / ANGLES
-    best = max((k * step for k in range(ANGLES)), key=torque)
-    low, high = best - step, best + step
+    best = max(LIKELY, key=lambda k: torque(k * step))
+    if best in (LIKELY[0], LIKELY[-1]):
+        best = max(range(ANGLES), key=lambda k: torque(k * step))
+    low, high = best * step - step, best * step + step
     inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     at_inner, at_outer = torque(inner), torque(outer)
     while high - low > PRECISION:
@@ -187,8 +190,8 @@ def _greatest(motor: Motor, drive: Drive, rate: float, level: float) -> tuple[fl
             low, inner, at_inner = inner, outer, at_outer
             outer = low + GOLDEN * (high - low)
             at_outer = torque(outer)
-    best = (low + high) / 2
-    return torque(best), best
+    angle = (low + high) / 2
+    return torque(angle), angle
 
 
 def torque_curve(motor: Motor, drive: Drive, rates: Iterable[float], *, level: float = 1.0) -> list[PullOut]:
