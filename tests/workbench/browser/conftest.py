@@ -23,15 +23,15 @@ pytest.importorskip("nicegui", reason="nicegui is not installed")
 CHROMIUM = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
 )
-GROUP = pytest.mark.xdist_group("browser")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """All of them in one worker: they share the workbench and the browser."""
-    here = str(Path(__file__).parent)
-    for item in items:
-        if str(item.path).startswith(here):
-            item.add_marker(GROUP)
+    """The files by turns in one of two workers: those of one share its workbench, and no worker ends long behind."""
+    here = Path(__file__).parent
+    own = [item for item in items if item.path.parent == here]
+    files = sorted({item.path for item in own})
+    for item in own:
+        item.add_marker(pytest.mark.xdist_group(f"browser {files.index(item.path) % 2}"))
 
 
 @pytest.fixture(scope="module")

@@ -133,7 +133,7 @@ def test_lengths_are_shown_in_mm_where_a_lead_is_given(motion: Window) -> None:
     motion.until("() => document.querySelector('[data-fact=peak]').textContent === '12.5 mm/s'")
     assert fact(motion, "accelerates") == "154.7 mm/s\u00b2"  # 12 375 / 80, (1000**2 - 100**2) / 80 steps/s2
     motion.picture("motion-mm")
-    motion.page.locator("[data-role=measure]").select_option("deg")
+    motion.page.locator("[data-role=measure]").select_option("\u00b0")
     assert float(lead.input_value()) == pytest.approx(400 / 360)  # half steps of a motor with 200 steps
     motion.page.locator("[data-role=measure]").select_option("")
 
