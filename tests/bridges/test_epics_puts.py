@@ -172,7 +172,7 @@ def test_a_put_is_answered_when_its_monitors_have_been_sent(model: str, monkeypa
     assert served(test, monkeypatch, model) == []
 
 
-@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 5])
+@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 12])
 def test_every_field_is_monitored_read_and_put_in_every_type(
     every: int, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

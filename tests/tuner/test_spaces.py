@@ -160,7 +160,6 @@ def test_a_board_whose_slope_is_the_limit_has_settings_all_the_same(size: str) -
     made = law("bs0610", {"step_size": size})
     rig = Rig(motor("qsh4218-41-10-035"), Drive(5, 1.0, made.windings[0], "voltage"), Load(5.4e-6, friction=0.01))
     found = space(Task("bs0610", rig, moves_of("800"), {"step_size": size}))
-    profiles = [
-        found.profile(point) for point in points([one.values for one in found.dimensions]) if found.admits(point)
-    ]
-    assert sum(profile is not None for profile in profiles) >= 20
+    every = points([one.values[::2] for one in found.dimensions])
+    profiles = [found.profile(point) for point in every if found.admits(point)]
+    assert sum(profile is not None for profile in profiles) >= 5

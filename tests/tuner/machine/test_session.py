@@ -211,7 +211,7 @@ class TestWhatGoesWrong:
     def test_a_loss_on_the_way_back_is_noticed(self) -> None:
         """The drive is off for a part of the way back: the carriage is farther out than the count says."""
         bed = gsc200s()
-        plan = short(bed)
+        plan = short(bed, begin=("S=60", "T=400", "R=24"))
         inner, count = bed.bench.slowly, [0]
 
         def slowly(rate):  # type: ignore[no-untyped-def]
@@ -247,7 +247,7 @@ class TestWhatGoesWrong:
         """The move that nobody was told of is over; a new reference, and the trial again."""
         bed = gsc200s(patience=0.2)
         bed.on[2] = lambda: bed.cell.breaks(OnLine(0, CableOut()), 10**9)
-        found = bed.run(short(bed))
+        found = bed.run(short(bed, begin=("S=60", "T=400", "R=24")))
         assert bed.kinds().count("mishap") >= 1
         assert found.found.bad is not None
         bed.stays_within(SHORT)
