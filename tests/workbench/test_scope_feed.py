@@ -263,6 +263,33 @@ def test_a_file_comes_with_its_name() -> None:
     at(SECOND, story)
 
 
+def test_frames_are_shown_while_a_file_is_made_and_one_is_made_at_a_time() -> None:
+    async def story(bench: Bench, window: Window) -> None:
+        made = asyncio.Event()
+
+        async def slow(*_: object) -> bytes:
+            await made.wait()
+            return b"x"
+
+        bench.export = slow  # type: ignore[method-assign]
+        asked = {"export": {"kind": "csv", "traces": ["bar.UO1"], "begin": 0, "end": SECOND}}
+        window.say(asked)
+        for _ in range(3):
+            window.say({"view": VIEW})
+            header, _ = await window.frame()
+            assert header["now"] == bench.state.now
+            window.say("")
+        window.say(asked)
+        assert await window.news() == {"error": "an export is under way: wait for it"}
+        made.set()
+        header, data = await window.frame()
+        assert (header, data[:1]) == ({"file": "a-cell.csv"}, b"x")
+        made.clear()
+        window.say(asked)  # and it leaves meanwhile
+
+    at(100 * SECOND, story)
+
+
 def test_a_window_that_leaves_is_not_called_any_more() -> None:
     async def story(bench: Bench, window: Window) -> None:
         window.say({"view": VIEW})

@@ -1,6 +1,5 @@
 """What the page Begin asks of the server: what can be opened, opening it, making a new cell, looking commands up."""
 
-import asyncio
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
@@ -18,6 +17,7 @@ from detent.realtime.examples import home
 from detent.realtime.images import cell_name
 from detent.realtime.texts import read_text
 from detent.workbench.answers import Command, Fittings, Places
+from detent.workbench.beside import beside
 from detent.workbench.drafts import Drafts
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
@@ -52,7 +52,7 @@ class Beginning:
 
     async def places(self) -> Places:
         """What can be opened: models, examples with their titles, cells in the folder; which is open."""
-        examples, cells = await asyncio.to_thread(self._read)
+        examples, cells = await beside(self._read)
         return {
             "open": self._bench.picture.target,
             "models": [(name, model.title) for name, model in catalogue.MODELS.items()],
@@ -88,7 +88,7 @@ class Beginning:
 
     async def jacks(self) -> dict[str, dict[str, list[str]]]:
         """For each model, parts too, what wires lead from and to."""
-        return await asyncio.to_thread(jacks)
+        return await beside(jacks)
 
     async def fittings(self) -> Fittings:
         """What units of a new cell can have: motors, by name; axes of each model that moves something, and programs.
@@ -100,14 +100,14 @@ class Beginning:
             "motors": list(known),
             "supplies": dict.fromkeys(known, SUPPLY),
             "direct": {name: max(LEAST, round(motor.current * motor.resistance, 1)) for name, motor in known.items()},
-            "uncontrolled": await asyncio.to_thread(_uncontrolled),
-            "axes": await asyncio.to_thread(lambda: {name: _axes(name) for name in catalogue.MODELS}),
+            "uncontrolled": await beside(_uncontrolled),
+            "axes": await beside(lambda: {name: _axes(name) for name in catalogue.MODELS}),
             "programs": [name for name, model in catalogue.MODELS.items() if model.language is not None],
         }
 
     async def new_cell(self, cell: NewCell, name: Name = "") -> str:
         """The cell file of what was chosen, for a file of that name. Raises ValueError with what is wrong."""
-        return await asyncio.to_thread(cell.text, self._beside(name))
+        return await beside(cell.text, self._beside(name))
 
     def _beside(self, name: str) -> Callable[[str], str]:
         """Reads files that a cell file of that name would name."""
@@ -116,7 +116,7 @@ class Beginning:
     async def save_cell(self, name: Name, cell: NewCell, over: bool = False) -> str:
         """Write a new cell into the folder, never over a file unless `over` says so. Returns its name."""
         name = name if name.endswith(".toml") else f"{name}.toml"
-        text = await asyncio.to_thread(cell.text, self._beside(name))
+        text = await beside(cell.text, self._beside(name))
         if self._folder.path(name).is_file() and not over:
             raise FileExistsError(f"{name} is there already: give it another name, or say that it may be replaced")
         self._folder.write(name, text.encode())

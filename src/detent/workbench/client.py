@@ -24,6 +24,7 @@ from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.endpoints.tcp import TcpAddress
 from detent.ticks import SECOND, Ns
 from detent.workbench import exports, joining
+from detent.workbench.beside import beside
 from detent.workbench.messages import (
     Answer,
     Ask,
@@ -582,12 +583,12 @@ class Bench:
         try:
             if kind in ("vcd", "sr", "npz"):
                 recording, views, until = self._mirror.recording(), self._mirror.views, self._mirror.until
-                return await asyncio.to_thread(lambda: exports.whole(kind, Signals(recording, views, until)))
+                return await beside(lambda: exports.whole(kind, Signals(recording, views, until)))
             chosen = [trace for trace in self.traces if trace.key in traces or (not traces and not trace.digital)]
             if not chosen:
                 raise BenchError("there is no such trace to export")
             data = self._scope.columns([trace.key for trace in chosen], first, last, exports.CSV_ROWS, first)
-            return await asyncio.to_thread(exports.table, chosen, data)  # the words of a million numbers take seconds
+            return await beside(exports.table, chosen, data)  # the words of a million numbers take seconds
         except (ValueError, OSError) as error:
             raise BenchError(str(error)) from error
 

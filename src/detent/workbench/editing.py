@@ -4,13 +4,13 @@ Everything is a call that a window makes (see `live`); texts and answers are pla
 are in `filing`.
 """
 
-import asyncio
 from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
 from detent.assembler import ImageError
 from detent.workbench.answers import CheckedProgram, ComparedProgram, ProgramFacts
+from detent.workbench.beside import beside
 from detent.workbench.drafts import LONGEST
 from detent.workbench.live import Live
 from detent.workbench.programs import Checked, Program
@@ -77,7 +77,7 @@ class Editing:
 
     async def check(self, unit: Name, text: Text) -> CheckedProgram:
         """Errors, addresses and labels of a text, and whether it is what program memory holds."""
-        checked = await asyncio.to_thread(self._program(unit).check, text)
+        checked = await beside(self._program(unit).check, text)
         return {
             "errors": [(wrong.line, wrong.column, wrong.length, wrong.message) for wrong in checked.errors],
             "places": [(line, place.address, len(place.code)) for line, place in checked.places.items()],
@@ -103,7 +103,7 @@ class Editing:
         """Read memory back (`kept`: what is kept without supply): the lines that differ, and words for it."""
         checked = await self._sound(unit, text)
         image = await self._bench.read_back(unit, kept=kept)
-        lines = await asyncio.to_thread(self._program(unit).differences, text, image)
+        lines = await beside(self._program(unit).differences, text, image)
         where = "what is kept without supply" if kept else "program memory"
         if not lines and self._holds_all(unit, checked, image):
             return {"lines": [], "words": f"{where} holds just this program", "same": True}
@@ -127,7 +127,7 @@ class Editing:
 
     async def _sound(self, unit: str, text: str) -> Checked:
         """The text assembled, beside the loop. ValueError with its first error."""
-        checked = await asyncio.to_thread(self._program(unit).check, text)
+        checked = await beside(self._program(unit).check, text)
         if checked.errors:
             first, more = checked.errors[0], len(checked.errors) - 1
             others = f" ({more} more)" if more else ""

@@ -18,6 +18,7 @@ from detent.moves.law import Law, Setting, clipped, in_force, stepping
 from detent.realtime.cell_source import find_cell
 from detent.workbench import motion, rigs
 from detent.workbench.answers import AxisFacts, DrawnMove, JudgedMove, MotorFacts, SettingFacts
+from detent.workbench.beside import beside
 from detent.workbench.live import Live
 from detent.workbench.motion import Floats, Picture
 from detent.workbench.rigs import Form, OwnMotor
@@ -147,7 +148,7 @@ class Moves:
         """What a motor makes of a move: its torque over speed, what the move asks of it, and the verdict."""
         law = self.law(wanted)
         async with self._one:
-            return await asyncio.to_thread(_judged, law, wanted, form, self.motors(), self.entry(wanted))
+            return await beside(_judged, law, wanted, form, self.motors(), self.entry(wanted))
 
     async def own(self, files: OwnMotor) -> MotorFacts:
         """What a form begins with for a motor of somebody's own. MotorError says what is wrong with its file."""

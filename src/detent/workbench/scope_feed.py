@@ -87,6 +87,7 @@ class Feed:
         self._stale = asyncio.Event()  # there is something new to show
         self._painted = asyncio.Event()  # the window has dealt with the last frame
         self._painted.set()
+        self._exporting: asyncio.Task[None] | None = None
         self._picture: object = None
         self._traces: dict[str, Trace] = {}
         self._shown: tuple[Ns, int] | None = None  # the present of the last frame, and the cut of the bench then
@@ -109,9 +110,10 @@ class Feed:
             pass
         finally:
             forget()
-            sender.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await sender
+            tasks = {sender} if self._exporting is None else {sender, self._exporting}
+            for task in tasks:
+                task.cancel()
+            await asyncio.wait(tasks)
 
     # -- what the window says ------------------------------------------------------------------------------
 
@@ -125,7 +127,10 @@ class Feed:
                 found = self._find(Find.model_validate(said["find"]))
                 await self._socket.send_text(json.dumps({"found": found}))
             elif "export" in said:
-                await self._export(Export.model_validate(said["export"]))
+                wanted = Export.model_validate(said["export"])
+                if self._exporting is not None and not self._exporting.done():
+                    raise ValueError("an export is under way: wait for it")
+                self._exporting = asyncio.create_task(self._export(wanted))
         except ValidationError as error:
             await self._wrong(error.errors()[0]["msg"])
         except MISTAKES as error:
@@ -135,10 +140,19 @@ class Feed:
         await self._socket.send_text(json.dumps({"error": words}))
 
     async def _export(self, wanted: Export) -> None:
-        data = await self._bench.export(wanted.kind, max(wanted.begin, 0), wanted.end, wanted.traces)
+        """Send a file, beside the frames."""
         picture = self._bench.picture
         name = re.sub(r"[^A-Za-z0-9]+", "-", picture.title or picture.target).strip("-").lower()[:40] or "cell"
-        await self._socket.send_bytes(packed({"file": f"{name}.{wanted.kind}"}, [data]))
+        words = ""
+        try:
+            data = await self._bench.export(wanted.kind, max(wanted.begin, 0), wanted.end, wanted.traces)
+        except MISTAKES as error:
+            words = str(error.args[0] if error.args else error)
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            if words:
+                await self._wrong(words)
+            else:
+                await self._socket.send_bytes(packed({"file": f"{name}.{wanted.kind}"}, [data]))
 
     def _find(self, wanted: Find) -> Ns | None:
         """The time of the nearest one in that direction."""

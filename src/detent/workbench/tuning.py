@@ -22,6 +22,7 @@ from detent.tuner.spaces import Point
 from detent.tuner.task import Task, moves_of
 from detent.workbench import rigs
 from detent.workbench.answers import PickedSettings
+from detent.workbench.beside import beside
 from detent.workbench.live import Live
 from detent.workbench.moves import Axis, Moves
 from detent.workbench.pipe import packed
@@ -106,7 +107,7 @@ class Tuning:
         if task is None or point is None:
             raise ValueError("there is no map: search first")
         async with self._picking:
-            found = await asyncio.to_thread(_picked, task, point, x, y)
+            found = await beside(_picked, task, point, x, y)
         return {**found, "commands": self._needed(found["commands"]), "resets": self._needed(found["resets"])}
 
     def _needed(self, lines: Sequence[str]) -> list[str]:

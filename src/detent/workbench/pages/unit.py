@@ -11,6 +11,7 @@ from nicegui import ui
 
 from detent.realtime.connect import HOSTS
 from detent.workbench.answers import UnitPlaces
+from detent.workbench.beside import beside
 from detent.workbench.icons import icon
 from detent.workbench.pages import Page, Window
 from detent.workbench.units.unit import RATES
@@ -30,15 +31,13 @@ def build(bench: "Bench", window: Window) -> None:
 
 def offer(site: "FastAPI", bench: "Bench", live: "Live") -> None:
     """Where units are found: the ports of this computer, and the endpoints of the cell."""
-    import asyncio
-
     from detent.realtime.addresses import PortError
     from detent.realtime.finding import listed
     from detent.workbench.units.beside import emulated
 
     async def unit_places() -> UnitPlaces:
         try:
-            ports = await asyncio.to_thread(listed)
+            ports = await beside(listed)
         except PortError:  # none can be listed here; a port of another computer can be named
             ports = []
         return {

@@ -23,6 +23,7 @@ from detent.hosts.exchange import Steps
 from detent.hosts.typed import Said
 from detent.outputs.files import write_whole
 from detent.workbench.answers import BackupDifferences, LineSaid, UnitRow, UnitTalk
+from detent.workbench.beside import beside
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
 from detent.workbench.stopping import Stopping
@@ -216,14 +217,14 @@ class Units:
     async def unit_compare(self, name: Name, source: Text) -> list[str]:
         """How the program of a unit and `source` differ, as the lines of a diff; none: they are the same."""
         unit = self._unit(name)
-        assembly = await asyncio.to_thread(_assembled, unit, source)
+        assembly = await beside(_assembled, unit, source)
         there = await unit.perform("comparing the program", places_of(unit.shell.driver, assembly))
         return list(unified_diff(there, numbered_lines_of(assembly), "the unit", "the text", lineterm="", n=2))
 
     async def unit_store(self, name: Name, source: Text, save: bool = False) -> str:
         """Store a program, verified; with `save` it is kept over a power-off, too. It is not started."""
         unit = self._unit(name)
-        assembly = await asyncio.to_thread(_assembled, unit, source)
+        assembly = await beside(_assembled, unit, source)
         lines = lines_of(assembly)
         driver = cast(Any, unit.shell.driver)
         await unit.perform("storing the program", driver.write_program(lines))
