@@ -135,3 +135,13 @@ def test_whatever_the_numbers_the_verdict_is_one(
     assert isfinite(verdict.load_angle)
     assert isfinite(verdict.error)
     assert verdict.lost == (verdict.load_angle > 360 or verdict.slip != 0)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("wrong", [1e308, 1e7, 1e-300, 0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("where", [0, 1])
+def test_a_point_of_a_curve_that_no_motor_has_is_refused_in_a_line(wrong: float, where: int) -> None:
+    point = (wrong, 0.2) if where == 0 else (300.0, wrong or 1e3)
+    if point != (300.0, 1e-300):  # so little torque there is
+        with pytest.raises(MotorError, match="does not belong to a motor of"):
+            fit_from_curve(SMALL, Drive(24, 1.0), [(100, 0.2), (200, 0.2), point])

@@ -21,6 +21,19 @@ def test_a_pipe_is_no_log(tmp_path: Path) -> None:
         TrialLog(tmp_path / "pipe")
 
 
+@pytest.mark.parametrize(
+    "line", [b"[" * 100_000, b'{"a":' * 50_000, b"9" * 5000, b"[]", b"null", b"\xff", b"{"], ids=len
+)
+def test_a_line_that_is_none_of_a_run_is_told_with_its_number_and_nothing_is_changed(
+    tmp_path: Path, line: bytes
+) -> None:
+    path = tmp_path / "log"
+    path.write_bytes(b'{"kind": "plan"}\n' + line + b"\n")
+    with pytest.raises(LogUnusable, match="line 2 is none of a tuning run: choose another --log FILE"):
+        TrialLog(path)
+    assert path.read_bytes() == b'{"kind": "plan"}\n' + line + b"\n"
+
+
 def test_what_is_cut_off_is_taken_off_and_the_rest_is_gone_on_with(tmp_path: Path) -> None:
     with TrialLog(tmp_path / "log") as log:
         log.write({"kind": "plan"})

@@ -202,7 +202,7 @@ def torque_curve(motor: Motor, drive: Drive, rates: Iterable[float], *, level: f
 def check_rate(rate: float) -> None:
     """Raise MotorError for a speed (full steps/s) that is none."""
     if isinstance(rate, bool | str) or not LEAST_RATE <= rate <= MOST_RATE:
-        raise MotorError(f"a speed is {LEAST_RATE:g} to {MOST_RATE:g} full steps/s, not {rate!r}")
+        raise MotorError(f"a speed is {LEAST_RATE:g} to {MOST_RATE:g} full steps/s, not {rate}")
 
 
 class Starts(NamedTuple):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from detent.motors.curve import GOLDEN, MOST_RATE, pull_out, torque_curve
+from detent.motors.curve import GOLDEN, LEAST_RATE, MOST_RATE, pull_out, torque_curve
 from detent.motors.drive import Drive
 from detent.motors.motor import Motor, MotorError
 from detent.motors.named import CURVES, motor
@@ -76,7 +76,7 @@ def fit_from_curve(motor: Motor, drive: Drive, points: Sequence[Point], *, frict
     if len(points) < 3 or len({rate for rate, _ in points}) < 3:
         raise MotorError(f"a curve of {len(points)} points: give at least three speeds")
     for rate, torque in points:
-        if not (rate > 0 and 0 <= torque <= 2 * motor.holding_torque):
+        if not (LEAST_RATE <= rate <= MOST_RATE and 0 <= torque <= 2 * motor.holding_torque):
             raise MotorError(
                 f"the point {rate:g} steps/s, {torque:g} Nm does not belong to a motor of {motor.holding_torque:g} Nm: "
                 "give full steps/s and Nm"

@@ -29,7 +29,7 @@ class TrialLog:
         try:
             self._file = open(path, "a+b")  # noqa: SIM115 - it is closed by close()
         except OSError as error:
-            raise LogUnusable(f"{path}: {error.strerror}: choose another place with --log FILE") from None
+            raise LogUnusable(f"{path}: {error.strerror or error}: choose another place with --log FILE") from None
         try:
             self.past = self._read()
         except BaseException:
@@ -52,7 +52,7 @@ class TrialLog:
         for number, line in enumerate(whole.splitlines(), 1):
             try:
                 record = json.loads(line)
-            except ValueError:
+            except (ValueError, RecursionError):
                 record = None
             if not isinstance(record, dict) or (number == 1 and record.get("kind") != "plan"):
                 raise LogUnusable(f"{self.path}: line {number} is none of a tuning run: choose another --log FILE")

@@ -125,6 +125,15 @@ class TestLog:
         assert other.run(short(other), bed.records) == found
         assert max(other.port.seen) < 1
 
+    @pytest.mark.parametrize("lost", [None, "false", 1, []])
+    def test_a_log_whose_trials_do_not_say_what_came_of_them_moves_nothing(self, whole: Whole, lost: object) -> None:
+        there, _ = whole
+        bed = gsc200s()
+        records = [{**one, "lost": lost} if one.get("kind") == "trial" else one for one in there.records]
+        with pytest.raises(OtherRun, match="trial 1 of the log is not one of this plan"):
+            bed.run(short(bed), records)
+        assert max(bed.port.seen, default=0) < 1
+
     def test_a_log_of_another_run_is_refused(self, whole: Whole) -> None:
         there, _ = whole
         bed = gsc200s()

@@ -107,11 +107,12 @@ def replayed(plan: Plan, bench: Bench, past: Iterable[Record]) -> tuple[Recipe, 
     for record in records:
         if record.get("kind") != "trial":
             continue
-        if not isinstance(ahead, Trial) or (record.get("knob"), record.get("steps")) != (ahead.knob, ahead.steps):
+        lost, which = record.get("lost"), (record.get("knob"), record.get("steps"))
+        if not isinstance(ahead, Trial) or which != (ahead.knob, ahead.steps) or not isinstance(lost, bool):
             raise OtherRun(f"trial {count + 1} of the log is not one of this plan: begin with another log")
         count += 1
-        losses += bool(record["lost"])
-        ahead = _sent(made, bool(record["lost"]))
+        losses += lost
+        ahead = _sent(made, lost)
     return made, ahead, count, losses
 
 
