@@ -69,7 +69,7 @@ def service(
         called = name if name is not None else _name(Path(cell))
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}", called):
             raise Problem("", "--name", f"{called!r}: letters, digits, - and _")
-        who = user if user is not None else getpass.getuser()
+        who = user if user is not None else _me()
         if not re.fullmatch(r"[a-z_][a-z0-9_-]*\$?", who):
             raise Problem("", "--user", f"{who!r} is no name of a user")
         check_outputs([output], found.inputs, asked=overwrite)
@@ -98,6 +98,16 @@ def service(
     print("    sudo systemctl daemon-reload")
     print(f"    sudo systemctl enable --now {called}")
     print(f"What it says:   journalctl -u {called} -f")
+
+
+def _me() -> str:
+    """The user who runs this. Raises Problem where the system has no name of one: a container, Windows."""
+    from detent.cell.description import Problem
+
+    try:
+        return getpass.getuser()
+    except (KeyError, ImportError, OSError):  # which of them depends on the system and on the version of Python
+        raise Problem("", "--user", "this system has no name for you: say who runs the service") from None
 
 
 def unit(description: "Description", cell: Path, name: str, user: str, control: str | None = None) -> str:
