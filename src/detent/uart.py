@@ -233,8 +233,9 @@ class Transmitter:
         while self.deadline <= now:
             start = self.deadline
             self._index += 1
-            done = self._end(self._index)
-            self._out.append(Sent(start, self._port, self._queue.popleft(), done))
+            char = self._queue.popleft()
+            done = self._end(self._index) if self._queue else self.busy_until
+            self._out.append(Sent(start, self._port, char, done))
             self.deadline = done if self._queue else NEVER
 
     def _end(self, characters: int) -> Ns:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.copying import duplicate
 from detent.cell.outside import Outside
+from detent.cell.overhearing import overhearing
 from detent.cell.recording import InputSet, Received, Recording
 from detent.cell.switches import CONTACT
 from detent.cell.wiring import Wiring
@@ -19,7 +20,7 @@ from detent.controllers.device import Device, DriveSet, EdgeSensitive, Output, P
 from detent.lines.line import EVERYBODY, Arrival, Line
 from detent.pins import HIGH, LOW, Level, Net, PinSet, find_pin
 from detent.ticks import NEVER, Ns
-from detent.uart import Chars, Format, Sent, heard_as
+from detent.uart import Char, Chars, Format, Sent, heard_as
 
 MOST_DELIVERIES = 1_000
 
@@ -64,6 +65,9 @@ class Circuit:
         self._driving: set[tuple[int, str]] = set()  # outputs that drive their nets: the others let them float
         self.deadlines: list[Ns] = [NEVER] * len(parts)  # when each part is to be advanced next
         self.line_deadline: Ns = NEVER  # the earliest of all lines
+        # by line: who need not hear what is for others; None where everybody hears everything
+        self._overhearing = [overhearing(parts, units) for units in wiring.lines]
+        self._turn_away = [named for named in self._overhearing if named is not None]
         self.stirred = False  # a part did something that is more than its own business; whoever looks puts it back
         self._touched: set[int] = set()
         self._instant: Ns = -1
@@ -78,7 +82,7 @@ class Circuit:
     @property
     def inside(self) -> Sequence[object]:
         """What it keeps for itself, but for what happens within an instant."""
-        return self._built, self._supplied, self._strange, self._driving
+        return self._built, self._supplied, self._strange, self._driving, self._overhearing
 
     def next(self) -> Ns:
         """When something happens next by itself; NEVER: nothing is left to do."""
@@ -149,6 +153,9 @@ class Circuit:
     def _drain(self, index: int) -> Sequence[Output]:
         """What a part did, and when it wants to be advanced next."""
         part = self.parts[index]
+        for named in self._turn_away:
+            if index in named.away:  # something was done to it
+                named.call(index, self.parts)
         deadline = part.next_deadline()
         self.deadlines[index] = NEVER if deadline is None else deadline
         return part.drain()
@@ -237,8 +244,9 @@ class Circuit:
 
     def another_cause(self) -> None:
         """What follows in this instant has a cause of its own, outside: its level changes are counted by themselves."""
-        self._deliveries.clear()
-        self._delivered = 0
+        if self._delivered:
+            self._deliveries.clear()
+            self._delivered = 0
 
     def _oscillation(self) -> Oscillation:
         """The error that names the inputs which change without end, each with the outputs that drive it."""
@@ -279,45 +287,64 @@ class Circuit:
 
     def hear(self, at: Ns) -> None:
         """Characters whose stop bits end now reach the units of their lines."""
-        for line, units in zip(self.lines, self.wiring.lines, strict=True):
+        for number, line in enumerate(self.lines):
             if line.deadline > at:
                 continue
             if line.strobe:
                 for level in line.strobes(at):
-                    for unit, _ in units:
+                    for unit, _ in self.wiring.lines[number]:
                         self._set_pin(unit, line.strobe, level)
             arrived = line.advance(at)
             if line.started():
-                for unit, port in units:
+                for unit, port in self.wiring.lines[number]:
                     self.parts[unit].set_pin(port, LOW, at)
                     self._touched.add(unit)
             if arrived:
-                self._arrive(arrived, line, units, at)
+                self._arrive(arrived, number, at)
         self._plan_lines()
         if self._touched:
             self._settle()
 
-    def _arrive(self, arrived: Sequence[Arrival], line: Line, units: Sequence[tuple[int, str]], at: Ns) -> None:
+    def _arrive(self, arrived: Sequence[Arrival], number: int, at: Ns) -> None:
         """Give what has arrived on a line to those units that it is for."""
+        line, units = self.lines[number], self.wiring.lines[number]
         everybody = all(arrival.place == EVERYBODY for arrival in arrived)
         sent = [arrival.sent for arrival in arrived]
-        chars = [one.char for one in sent]
-        parts, strange, recording, touched = self.parts, self._strange, self.recording, self._touched
-        if everybody and not strange and recording is None:  # 32 axes hear each character of a party line
-            touched.update([unit for unit, port in units if parts[unit].receive(port, chars, at) is not False])
+        strange, recording = self._strange, self.recording
+        if everybody and not strange:
+            if recording is not None:
+                for unit, port in units:
+                    recording.extend(unit, [Received(one.done, port, one.char, one.at) for one in sent])
+            self._reach_all(number, [one.char for one in sent], at)
             return
+        if (named := self._overhearing[number]) is not None:
+            named.call_all(self.parts)
         for place, (unit, port) in enumerate(units):
             if not everybody:
                 sent = [arrival.sent for arrival in arrived if arrival.place in (place, EVERYBODY)]
-                chars = [one.char for one in sent]
-            heard = chars
-            if unit in strange or recording is not None:
-                as_heard = [_as_heard(one, line.format, strange[unit]) for one in sent] if unit in strange else sent
-                heard = [one.char for one in as_heard]
-                if recording is not None and as_heard:
-                    recording.extend(unit, [Received(one.done, port, one.char, one.at) for one in as_heard])
-            if heard and parts[unit].receive(port, heard, at) is not False:
+            as_heard = [_as_heard(one, line.format, strange[unit]) for one in sent] if unit in strange else sent
+            if recording is not None and as_heard:
+                recording.extend(unit, [Received(one.done, port, one.char, one.at) for one in as_heard])
+            heard = [one.char for one in as_heard]
+            if heard and self.parts[unit].receive(port, heard, at) is not False:
+                self._touched.add(unit)
+
+    def _reach_all(self, number: int, chars: Sequence[Char], at: Ns) -> None:
+        """Give characters of one instant to all units of a line."""
+        parts, touched, named = self.parts, self._touched, self._overhearing[number]
+        if named is None:
+            units = self.wiring.lines[number]
+            touched.update([unit for unit, port in units if parts[unit].receive(port, chars, at) is not False])
+            return
+        skipped: list[tuple[int, str]] = []
+        for place in named.calls(chars, parts):
+            unit, port = place
+            if parts[unit].receive(port, chars, at) is False:
+                skipped.append(place)
+            else:
                 touched.add(unit)
+        if skipped:
+            named.turn_away(skipped, parts)
 
     # -- what the outside does to it ---------------------------------------------------------------------
 
@@ -328,11 +355,10 @@ class Circuit:
             self.lines[line].send(data, self.now)
             self._plan_lines()
             return
-        for unit, port in self.wiring.lines[line]:  # nothing waits on such a line: what is sent is heard
-            if self.recording is not None:
+        if self.recording is not None:
+            for unit, port in self.wiring.lines[line]:
                 self.recording.extend(unit, [Received(self.now, port, char, self.now) for char in chars])
-            self.parts[unit].receive(port, chars, self.now)
-            self._touched.add(unit)
+        self._reach_all(line, chars, self.now)  # nothing waits on such a line: what is sent is heard
         self._settle()
 
     def discard(self, line: int) -> None:

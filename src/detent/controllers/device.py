@@ -215,6 +215,30 @@ class EdgeSensitive(Protocol):
         """The wire of an input begins to be driven, or is let go, by a supply: the level is new, and it is no edge."""
 
 
+class NamedLines(NamedTuple):
+    """How lines look of which each is for one unit: its name first, `end` behind it."""
+
+    end: int
+    at_once: frozenset[int]  # characters that act wherever they stand
+
+
+class Named(Protocol):
+    """What a device has besides if it hears lines for others, and can be left alone with them."""
+
+    NAMED_LINES: NamedLines
+
+    @property
+    def turned_away(self) -> int | None:
+        """The name that a line has to begin with before this device does anything; None: it may do something now.
+
+        It is so within a line for somebody else, while nothing is under way, and until something else is done to it, or
+        a character is damaged or acts at once: whole lines change nothing here, nor does what is left of this one.
+        """
+
+    def line_ended(self) -> None:
+        """The line that it was turned away by ended, some time ago; to be told before the next one begins."""
+
+
 class Controller(Device, Protocol):
     """A device that moves an axis and may hold a program."""
 

@@ -29,14 +29,6 @@ class Arrival(NamedTuple):
     sent: Sent
 
 
-class Talking(NamedTuple):
-    """A character of a unit that is on the wire, as it will arrive."""
-
-    began: Ns
-    done: Ns
-    char: Char
-
-
 class Line:
     """One host, some units, one character format. With `timed` false, characters take no time.
 
@@ -71,7 +63,7 @@ class Line:
         self.heard: list[Heard] = []  # what reached the host and was not taken yet
         self._on_wire: list[Sent] = []  # from the host; also the transmitter's outbox
         self._host = Transmitter(HOST_PORT, form, self._on_wire, timed=timed)
-        self._from_units: list[Talking] = []
+        self._from_units: list[Sent] = []  # what they are sending, as it will arrive
 
     def immediate(self, data: Chars) -> list[Char]:
         """`data` as every unit hears it at once, on a plain line without timing; else nothing: `send` it."""
@@ -104,30 +96,34 @@ class Line:
 
     def from_unit(self, place: int, sent: Sent) -> None:
         """The unit at `place` on the line begins a character."""
-        began, done, char = sent.at, sent.done, sent.char
-        if began == done:  # characters take no time here, so that none can meet another
+        at, _, char, done = sent
+        if at == done:  # characters take no time here, so that none can meet another
             self.heard.append(Heard(done, char))
             return
         for index, other in enumerate(self._from_units):
-            if (other.began, other.done) == (began, done) and began < done:
+            if (other.at, other.done) == (at, done):
                 merged = Char(other.char.value & char.value, other.char.parity_ok, other.char.framing_ok)
                 self._from_units[index] = other._replace(char=merged)
                 return
-            if other.done > began:
+            if other.done > at:
                 self._from_units[index] = other._replace(char=other.char._replace(framing_ok=False))
-                char = char._replace(framing_ok=False)
-        self._from_units.append(Talking(began, done, char))
-        self._plan()
+                sent = sent._replace(char=sent.char._replace(framing_ok=False))
+        self._from_units.append(sent)
+        if done < self.deadline:
+            self.deadline = done
 
     def advance(self, now: Ns) -> list[Arrival]:
         """Deliver what is due: to the host into `heard`; returned is what reaches the units at `now`."""
         if self._host.deadline <= now:
             self._host.advance(now)
         if self._from_units:
-            done = [talking for talking in self._from_units if talking.done <= now]
-            if done:
-                self.heard += [Heard(talking.done, talking.char) for talking in done]
-                self._from_units = [talking for talking in self._from_units if talking.done > now]
+            sending = []
+            for sent in self._from_units:
+                if sent.done <= now:
+                    self.heard.append(Heard(sent.done, sent.char))
+                else:
+                    sending.append(sent)
+            self._from_units = sending
         if not self._on_wire:
             self._plan()
             return []
@@ -171,7 +167,7 @@ class Line:
             deadline = self._on_wire[0].done - self._early
         if self._start_bits and self._told < len(self._on_wire):
             deadline = min(deadline, self._on_wire[self._told].at)
-        for talking in self._from_units:
-            if talking.done < deadline:
-                deadline = talking.done
+        for sent in self._from_units:
+            if sent.done < deadline:
+                deadline = sent.done
         self.deadline = deadline

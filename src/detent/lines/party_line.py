@@ -4,7 +4,7 @@ Two pairs of wires: every axis hears what the adapter sends, the adapter hears e
 their pair, on which a 0 wins, as on any `Line`. A party line without an adapter in the cell is a plain `Line`.
 """
 
-from detent.lines.line import Arrival, Line, Talking
+from detent.lines.line import Arrival, Line
 from detent.ticks import Ns
 from detent.uart import Chars, Format, Sent
 
@@ -30,18 +30,17 @@ class PartyLine(Line):
             self._on_wire.append(sent)
             self._plan()
         elif sent.at == sent.done:
-            self._from_units.append(Talking(sent.at, sent.done, sent.char))
+            self._from_units.append(sent)
             self._plan()
         else:
             super().from_unit(place, sent)
 
     def advance(self, now: Ns) -> list[Arrival]:
         """Deliver what is due: from the host to every unit, from the units to the host."""
-        due = [talking for talking in self._from_units if talking.done <= now]
+        due = [sent for sent in self._from_units if sent.done <= now]
         from_host = super().advance(now)
         self.heard.clear()
-        to_host = [Sent(talking.began, "", talking.char, talking.done) for talking in due]
         return [
             *(arrival._replace(place=place) for arrival in from_host for place in range(self._places)),
-            *(Arrival(self._places, sent) for sent in to_host),
+            *(Arrival(self._places, sent) for sent in due),
         ]

@@ -14,6 +14,7 @@ from detent.controllers.dcb274.commands import MODEL
 from detent.controllers.dcb274.contacts import Contacts
 from detent.controllers.dcb274.desk import VERSION, Desk, Stage
 from detent.controllers.dcb274.link import (
+    AT_ONCE,
     CTRL_C,
     CTRL_N,
     CTRL_P,
@@ -35,7 +36,7 @@ from detent.controllers.dcb274.running import Running
 from detent.controllers.dcb274.settings import Settings
 from detent.controllers.dcb274.trip import Trip
 from detent.controllers.dcb274.work import Work, position
-from detent.controllers.device import StageSet, Status, Stop, StoreImage
+from detent.controllers.device import NamedLines, StageSet, Status, Stop, StoreImage
 from detent.controllers.powered import OneAxis
 from detent.pins import HIGH, LOW, Level, Pin, PulseOutput
 from detent.ticks import NEVER, Ns, instants
@@ -50,6 +51,7 @@ class Dcb274(OneAxis):
 
     model = MODEL
     INSTANTS = instants(_readout_at=0)
+    NAMED_LINES = NamedLines(LF, AT_ONCE)
 
     def __init__(
         self,
@@ -132,6 +134,15 @@ class Dcb274(OneAxis):
         self._rest(self._next())
         return True
 
+    @property
+    def turned_away(self) -> int | None:
+        """Its name, within a line for another axis, and while nothing is under way."""
+        return self._entry.turned_away if self._quiet else None
+
+    def line_ended(self) -> None:
+        """As if LF had come when it came: until now it made no difference whether that line was over."""
+        self._entry.skips(LF)
+
     def _rest(self, following: Ns) -> None:
         """Note whether nothing is under way, so that nothing happens but by an input; `following` is due next."""
         self._quiet = (
@@ -193,7 +204,8 @@ class Dcb274(OneAxis):
             return NEVER
         while (at := self._next()) <= now:
             self._do_due(at)
-        self._rest(at)
+        if at >= NEVER:
+            self._rest(at)
         return at
 
     def _do_due(self, at: Ns) -> None:
@@ -562,16 +574,15 @@ class Dcb274(OneAxis):
         """Jog and go, in the idle state: no command begun or in hand, no program (page 27)."""
         desk, motion, ports = self._desk, self._motion, self._ports
         self._contacts.look()
-        jog = self._contacts.jog
         if motion.jogging:  # its release is heeded whatever else is going on
-            motion.jog(jog, ports.active("JOG-S"), now)
+            motion.jog(self._contacts.jog, ports.active("JOG-S"), now)
             return
         idle = desk.stage is Stage.FREE and not desk.programming and not self._running.active and self._entry.empty
         if not idle or ports.stopped:
             return
         if not motion.completing(now) and self._contacts.ask("GO"):
             self._running.go(0, False, now)
-        elif motion.at_rest and jog:
+        elif motion.at_rest and (jog := self._contacts.jog):
             motion.jog(jog, ports.active("JOG-S"), now)
 
     def _read_out(self, now: Ns) -> None:

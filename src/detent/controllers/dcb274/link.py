@@ -74,6 +74,10 @@ class Entry(Protocol):
     def skips(self, value: int) -> bool:
         """Take a character that means nothing to this axis; False, and it is not taken, if it may mean something."""
 
+    @property
+    def turned_away(self) -> int | None:
+        """The name that it skips all lines up to, while one for others is under way; None: this one may be for it."""
+
     def feed(self, value: int) -> Entered:
         """Take one character."""
 
@@ -101,6 +105,11 @@ class SingleEntry:
     def skips(self, value: int) -> bool:
         """None: every character may mean something."""
         return False
+
+    @property
+    def turned_away(self) -> int | None:
+        """Never: every line is for it."""
+        return None
 
     def feed(self, value: int) -> Entered:
         """Take one character."""
@@ -132,7 +141,7 @@ class SingleEntry:
         self._too_long = False
 
 
-_SINGLE: Final = frozenset((ESC, CTRL_C, CTRL_N, CTRL_P))
+AT_ONCE: Final = frozenset((ESC, CTRL_C, CTRL_N, CTRL_P))
 
 
 class _Place(Enum):
@@ -206,7 +215,7 @@ class NamedEntry:
         Of 32 axes on a line, 31 do nothing else with nearly every character.
         """
         place = self._place
-        if self._passes or value in _SINGLE:
+        if self._passes or value in AT_ONCE:
             return False
         if place is _OTHERS:
             if value == LF:
@@ -217,6 +226,11 @@ class NamedEntry:
         if value != LF:
             self._place = _OTHERS
         return True
+
+    @property
+    def turned_away(self) -> int | None:
+        """Its name, within a line for others that it does not pass on."""
+        return self.name if self._place is _OTHERS and not self._passes else None
 
     def clear(self) -> None:
         """As behind a LF."""
