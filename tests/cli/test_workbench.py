@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from detent.cli import main
+from detent.workbench.listening import Listening
 
 pytest.importorskip("nicegui", reason="nicegui is not installed")
 
@@ -72,3 +73,10 @@ def test_it_says_what_to_open_and_a_signal_ends_it_cleanly(tmp_path: Path) -> No
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out, err) == (0, "", "")
+
+
+def test_a_page_has_an_address_with_the_token() -> None:
+    listening = Listening(socket.socket(), "0.0.0.0", 8274)
+    with listening.socket:
+        assert listening.url("word", "unit") == "http://127.0.0.1:8274/unit?token=word"
+        assert listening.url(None) == "http://127.0.0.1:8274/"

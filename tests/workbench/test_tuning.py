@@ -94,7 +94,7 @@ def test_a_load_that_nothing_turns_is_said_to_be_one() -> None:
         assert "does not turn this load" in told(live)["words"]
         with pytest.raises(ValueError, match="search first"):
             await tuning.pick(100, 100)
-        with pytest.raises(ValueError, match="200,1000x3"):
+        with pytest.raises(ValueError, match=r"^moves many: .*200,1000x3"):
             await tuning.begin(Axis(unit="gs-c200"), FORM, Asked(moves="many"))
         with pytest.raises(ValueError, match="write inertia"):
             await tuning.begin(Axis(unit="gs-c200"), FORM, Asked(moves="60", vary="inertia=much"))

@@ -188,13 +188,15 @@ def workbench(
                 except ValueError as error:
                     raise Problem("", "", str(error)) from None
 
+            first = listening.url(token, "" if at is None else "unit")  # who connects a unit wants to see it
+
             def ready() -> None:
                 if json:
                     print(json_text.dumps(_facts(bench, url)), flush=True)
                 else:
-                    _print_ready(bench, url, chosen.root, kept)
+                    _print_ready(bench, first, chosen.root, kept)
                 if open_:
-                    webbrowser.open(url)
+                    webbrowser.open(first)
 
             try:
                 await server.serve(site, listening, ready)

@@ -28,13 +28,13 @@ class Listening(NamedTuple):
     host: str
     port: int
 
-    def url(self, token: str | None) -> str:
-        """The address to open in a browser on this machine."""
+    def url(self, token: str | None, page: str = "") -> str:
+        """The address to open in a browser on this machine; of a page, by its path."""
         named = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
         with contextlib.suppress(ValueError):
             if ipaddress.ip_address(named).version == 6:
                 named = f"[{named}]"
-        return f"http://{named}:{self.port}/" + (f"?token={token}" if token else "")
+        return f"http://{named}:{self.port}/{page}" + (f"?token={token}" if token else "")
 
 
 def listen_as_usual(host: str, token: str | None) -> Listening:

@@ -19,7 +19,7 @@ from detent.moves.law import clipped
 from detent.tuner.judge import judge_of
 from detent.tuner.report import option_lines
 from detent.tuner.spaces import Point
-from detent.tuner.task import Task, moves_of
+from detent.tuner.task import Task, TunerError, moves_of
 from detent.workbench import rigs
 from detent.workbench.answers import PickedSettings
 from detent.workbench.beside import beside
@@ -70,8 +70,11 @@ class Tuning:
         made = rigs.made(law, form, self._moves.motors(), self._moves.entry(wanted))
         options = dict(self._moves.options(wanted))
         spread = SPREAD.changed(ranges_of(asked.vary))
-        task = Task(law.model, made.rig, moves_of(asked.moves), options, self._moves.axis(wanted), spread, asked.seed,
-                    asked.corners, final=asked.variants)  # fmt: skip
+        try:
+            task = Task(law.model, made.rig, moves_of(asked.moves), options, self._moves.axis(wanted), spread,
+                        asked.seed, asked.corners, final=asked.variants)  # fmt: skip
+        except TunerError as error:
+            raise ValueError(str(error).replace("--moves", "moves", 1)) from None  # here it is a field
         self._task, self._point = task, None
         self._spare = f"{options['step_size']}!" if "step_size" in options else ""
         self._live.put({"tuning.found": None, "tuning.map": None})

@@ -96,3 +96,34 @@ def test_another_measure_moves_nothing_and_is_the_same_on_the_page_motion(window
     page.locator(".motion-units").get_by_role("tab", name=name, exact=True).click()
     window.until("() => document.querySelector('.motion [data-role=measure]').value === '°'")
     assert lead.input_value() == "0.8889"
+
+
+def test_the_tour_takes_no_real_unit_for_one_that_can_be_taken_back(windows: Windows, bench: Served) -> None:
+    window = windows.new(bench, tour=True).open("/")
+    tour = window.page.get_by_role("dialog", name="Guided tour")
+    tour.get_by_text("The real unit that is connected is on the page Unit").wait_for()
+
+
+def test_a_program_that_is_written_for_a_unit_is_found_again(windows: Windows, bench: Served) -> None:
+    window = windows.new(bench).open("/unit")
+    window.until(KNOWN)
+    source = window.page.get_by_role("textbox", name="Program source")
+    source.fill("+ 100\n")
+    window.page.get_by_role("link", name="Scope", exact=True).click()
+    window.page.locator(".scope canvas").first.wait_for()
+    window.page.get_by_role("link", name="Unit", exact=True).click()
+    window.until(KNOWN)
+    window.until("() => document.querySelector('[data-role=source]')?.value === '+ 100\\n'")
+
+
+def test_a_unit_that_moves_is_not_left_at_the_first_click(windows: Windows, bench: Served, real: str) -> None:
+    window = windows.new(bench).open("/unit")
+    window.until(KNOWN)
+    name = next(name for name in window.get("r.names") if real in name)
+    window.page.get_by_role("tab", name=name).click()
+    window.call("unit_say", name, "M 300")
+    window.until("(name) => detent.get(`r.${name}`).moving", name)
+    window.click("Leave")
+    window.page.get_by_text("Click once more: it moves, and STOP does not reach it then.").wait_for()
+    assert name in window.get("r.names")
+    window.call("unit_stop", name)

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { FORMS, grouped, pitch, remeasured, seconds, wordsOf } from "./assets/forms.js";
+import { apart, FORMS, grouped, pitch, remeasured, seconds, wholeSteps, wordsOf } from "./assets/forms.js";
 
 test("numbers stand in groups of three, with a real minus", () => {
   assert.equal(grouped(0), "0");
@@ -51,4 +51,17 @@ test("another measure is the same length, and what is no number stays what it is
   assert.equal(remeasured("-90", 10 / 9, 1), "-100");
   for (const written of ["", " ", "x", "Infinity"]) assert.equal(remeasured(written, 1, 200), written);
   assert.equal(remeasured("100", 3, 3), "100");
+});
+
+test("of two names what tells them apart is shown", () => {
+  assert.equal(apart("gs-c200 /dev/ttyUSB0 address=2", "gs-c200 /dev/ttyUSB0 address=1"), "\u2026 address=2");
+  assert.equal(apart("gs-c200 (cell)", "gs-c200 /dev/ttyUSB0"), "\u2026 (cell)");
+  assert.equal(apart("dcb-274 (cell)", "gs-c200 (cell)"), "dcb-274 (cell)");
+  assert.equal(apart("a", "a b"), "a");
+});
+
+test("a length is whole steps, and one that nobody goes is refused in words", () => {
+  assert.equal(wholeSteps(2.5), 3);
+  assert.equal(wholeSteps(-99.6), -100);
+  for (const far of [2 ** 31, -(2 ** 40), 1e300, Infinity]) assert.throws(() => wholeSteps(far), /farther/);
 });

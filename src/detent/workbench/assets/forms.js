@@ -67,3 +67,25 @@ export function remeasured(written, before, after) {
   if (written.trim() === "" || !Number.isFinite(value) || before === after) return written;
   return String(+((value * before) / after).toPrecision(9));
 }
+
+/**
+ * A name without the words with which another begins, too: what tells them apart is seen where there is little room.
+ * @param {string} name
+ * @param {string} other
+ */
+export function apart(name, other) {
+  const words = name.split(" ");
+  const others = other.split(" ");
+  const same = words.findIndex((word, n) => word !== others[n]);
+  return same > 0 ? `\u2026 ${words.slice(same).join(" ")}` : name;
+}
+
+/**
+ * A length in whole steps. Throws what is wrong with it, in words.
+ * @param {number} value
+ */
+export function wholeSteps(value) {
+  const steps = Math.round(value);
+  if (Math.abs(steps) < 2 ** 31) return steps;
+  throw new Error(`${steps.toPrecision(3)} steps are farther than any of these controllers goes.`);
+}

@@ -1,6 +1,6 @@
 // Manual control of the axes of the page Cell: what is clicked is said to the unit by its host, in the unit's own commands.
 
-import { remeasured } from "./forms.js";
+import { remeasured, wholeSteps } from "./forms.js";
 import { holding } from "./holding.js";
 
 const { part, on, get, call, toast, failed, remembered, remember } = window.detent;
@@ -46,8 +46,9 @@ part("manual", (box) => {
   /** @param {"jog" | "go" | "zero" | "home"} what */
   async function move(what, value = 0) {
     try {
+      const steps = wholeSteps(value);
       await there();
-      told(await call("unit_move", name, what, value));
+      told(await call("unit_move", name, what, steps));
     } catch (error) {
       failed(error);
     }
@@ -66,11 +67,11 @@ part("manual", (box) => {
 
   for (const button of box.querySelectorAll("[data-jog]")) button.addEventListener("click", () => {
     const by = number(role("by"));
-    if (by !== null) move("jog", Math.round(by * scale()) * Number(button.dataset.jog));
+    if (by !== null) move("jog", by * scale() * Number(button.dataset.jog));
   });
   role("go").addEventListener("click", () => {
     const to = number(role("by"));
-    if (to !== null) move("go", Math.round(to * scale()));
+    if (to !== null) move("go", to * scale());
   });
   role("zero").addEventListener("click", () => move("zero"));
   for (const button of box.querySelectorAll("[data-home]")) button.addEventListener("click", () => move("home", Number(button.dataset.home)));

@@ -20,6 +20,19 @@ const REAL = {
   "Drag back": "The past is kept. Drag the time line back, and you see the cell as it was then; the machine goes on meanwhile. Press go, and you are at its present again.",
 };
 
+// where a real unit is connected, the cell is the same model by the book
+/** @type {Record<string, string>} */
+const CONNECTED = {
+  "Welcome to the workbench": "This page shows a cell of controllers that is computed. The real unit that is connected is on the page Unit: what is done there is done, and is not taken back. STOP, above every page, stops it. Six short stops.",
+  "Drag back": "The whole past of the cell is kept. Drag the time line back, and the cell is as it was then; press go, and it goes on from there. A real unit knows no way back: its time goes on.",
+};
+
+/** What a stop of the tour says where we are. */
+const said = (/** @type {string} */ title, /** @type {string} */ text) => {
+  const outside = (get("r.names") || []).some((/** @type {string} */ name) => !name.endsWith(" (cell)"));
+  return (get("real") && REAL[title]) || (outside && CONNECTED[title]) || text;
+};
+
 /** @type {{box: Part, spot: HTMLElement} | null} what is on the page while the tour is */
 let shown = null;
 let at = 0;
@@ -37,7 +50,7 @@ function show() {
   const [selector, title, text] = STOPS[at];
   const target = selector ? document.querySelector(selector) : null;
   box.querySelector("h2").textContent = title;
-  box.querySelector("p").textContent = (get("real") && REAL[title]) || text;
+  box.querySelector("p").textContent = said(title, text);
   box.querySelector(".count").textContent = `${at + 1} of ${STOPS.length}`;
   box.querySelector(".next").textContent = at + 1 < STOPS.length ? "Next" : "Done";
   box.querySelector(".before").style.visibility = at ? "visible" : "hidden";

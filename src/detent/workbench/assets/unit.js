@@ -1,7 +1,7 @@
 // The page Unit: the unit that is chosen, filled into the markup of detent/workbench/pages/unit.py.
 
 import { worded } from "./elements.js";
-import { remeasured, wordsOf } from "./forms.js";
+import { apart, remeasured, wholeSteps, wordsOf } from "./forms.js";
 import { holding } from "./holding.js";
 
 const { part, on, get, call, meant, make, toast, failed, remembered, remember, seconds, grouped } = window.detent;
@@ -110,6 +110,7 @@ part("unit", (box) => {
     seen = "";
     for (const one of ["answers", "sent", "told"]) role(one).replaceChildren();
     role("restore").hidden = true;
+    role("source").value = (name !== null && remembered(`source.${name}`)) || "";
     for (const one of role("tabs").children) one.setAttribute("aria-selected", one.textContent === (name ?? "Connect\u2026") ? "true" : "false");
     besides();
     measure();
@@ -227,7 +228,11 @@ part("unit", (box) => {
   }
 
   role("again").addEventListener("click", () => tried(() => call("unit_again", shown())));
-  role("leave").addEventListener("click", () => tried(() => call("unit_leave", shown())));
+  role("leave").addEventListener("click", (event) => {
+    const leave = () => tried(() => call("unit_leave", shown()));
+    if (now().moving === false) leave();
+    else sure(event.currentTarget, `Click once more: ${now().moving ? "it moves" : "it may move"}, and STOP does not reach it then.`, leave);
+  });
   const paused = () => meant(`r.${chosen}.paused`, now().paused);
   /** @param {boolean} pause */
   const ask = (pause) => make(`r.${chosen}.paused`, pause, () => tried(() => call("unit_asking", shown(), pause, Number(role("rates").value))));
@@ -282,10 +287,12 @@ part("unit", (box) => {
       toast(`Write first how many steps a ${role("measure").value} is, a number above 0.`, "error");
       return null;
     }
-    const whole = Math.round(value * (lead() || 1));
-    if (Math.abs(whole) < 2 ** 31) return whole;
-    toast(`${grouped(whole)} steps are farther than any of these controllers goes.`, "error");
-    return null;
+    try {
+      return wholeSteps(value * (lead() || 1));
+    } catch (error) {
+      failed(error);
+      return null;
+    }
   }
 
   /**
@@ -382,7 +389,7 @@ part("unit", (box) => {
     const select = role("beside");
     const before = select.value;
     const others = names().filter((/** @type {string} */ name) => name !== chosen);
-    select.replaceChildren(new Option("to it alone", ""), ...others.map((/** @type {string} */ name) => new Option(`and to ${name}`, name)));
+    select.replaceChildren(new Option("to it alone", ""), ...others.map((/** @type {string} */ name) => new Option(`and to ${apart(name, chosen ?? "")}`, name)));
     select.value = others.includes(before) ? before : "";
     select.hidden = !others.length;
   }
@@ -427,7 +434,9 @@ part("unit", (box) => {
     if (told.length > 1) {
       const same = JSON.stringify(told[0].answers) === JSON.stringify(told[1].answers) && told[0].refused === told[1].refused;
       const by = told[0].ms !== null && told[1].ms !== null ? `, ${Math.abs(told[0].ms - told[1].ms).toFixed(1)} ms between them` : "";
-      parts[0].append(worded("span", same ? "same" : "differ", same ? ` the same answers${by}` : ` they differ${by}`));
+      const silent = told.every((/** @type {any} */ one) => !one.answers.length && one.refused);
+      parts[0].append(silent ? worded("span", "differ", " neither has answered")
+        : worded("span", same ? "same" : "differ", same ? ` the same answers${by}` : ` they differ${by}`));
     }
     role("answers").replaceChildren(...parts);
   }
@@ -448,17 +457,25 @@ part("unit", (box) => {
   /** @param {string} text */
   const tell = (text) => (role("told").textContent = text);
   const source = () => role("source").value;
+  const keep = () => remember(`source.${shown()}`, source()); // what is written for a unit is found again, and is no other's
+  role("source").addEventListener("input", keep);
 
   role("read").addEventListener("click", async () => {
     const read = async () => {
       const before = source();
-      const text = await tried(() => call("unit_source", shown()));
+      const mine = shown();
+      const text = await tried(() => call("unit_source", mine));
       if (text === undefined) return;
+      if (mine !== shown()) {
+        toast(`The program of ${mine} was read, but another unit is shown by now: read it again.`);
+        return;
+      }
       if (source() !== before) {
         tell("The text here was changed meanwhile, so it was not replaced by the program of the unit.");
         return;
       }
       role("source").value = text;
+      keep();
       tell(text.trim() ? "read from the unit" : "the unit holds no program");
     };
     if (source().trim()) sure(role("read"), "Click once more: what is written here is replaced.", read);
