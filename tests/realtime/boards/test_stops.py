@@ -11,6 +11,7 @@ from detent.pulses import Train, Uniform
 from detent.ramps import constant_acceleration
 from detent.realtime.boards.events import CountDiffers, InputChanged, Stopped
 from detent.realtime.boards.fake.machine import MachineSwitch
+from detent.realtime.boards.guard import Guard
 from detent.ticks import MS, SECOND, US
 
 LIMIT = MachineSwitch("slide", "gpio10", 500, 1 << 30, inside=False)  # EOT: low beyond
@@ -274,3 +275,32 @@ def test_no_step_follows_a_stop_that_fires_before_the_first_steps_are_sent(late:
     made.boards.steppers["slide"].rewind(0)
     made.run(200 * MS)
     assert not made.machine.steps
+
+
+def test_what_was_armed_before_a_stop_was_heard_of_does_not_pass_for_armed() -> None:
+    """The stepper ran dry, and an input was let go meanwhile: it is guarded from the first step of what comes later."""
+    made = bench(MachineSwitch("slide", "gpio10", 60, 1 << 30, inside=False))
+    stop, stepper, dry = made.boards.stops["slide"], made.boards.steppers["slide"], []
+    guard = Guard(stop)
+    guard.want({"EOT": 0, "HOME": 0}, made.now, made.now)
+    made.move(constant_acceleration.move(1000, 1000, 1, 400).train, 1)
+    [started] = made.told["slide"]
+
+    def hear() -> None:
+        for event in made.boards.events():
+            made.events.append(event)
+            if isinstance(event, Stopped) and event.dry:
+                stop.arm({"EOT": False}, made.now)  # of before it was heard of
+                guard.fired()
+                guard.want({"EOT": 0}, started.train.time_of(event.shaft + 1) - 1, made.now)
+                stepper.rewind(event.shaft, slipped=True)
+                stepper.tell(started)
+                dry.append(event)
+
+    made.hear = hear  # type: ignore[method-assign]
+    made.run(50 * MS)
+    made.turn(made.wall + 70 * MS)
+    made.until(lambda: bool(by_input(made)))
+    assert len(dry) == 1
+    assert dry[0].shaft < 60
+    assert by_input(made)[0].shaft == 60 == made.machine.axes["slide"].position

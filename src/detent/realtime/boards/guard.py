@@ -61,11 +61,12 @@ class Guard:
                 self._stop.disarm()
 
     def fired(self) -> None:
-        """The stop has fired: nothing is armed any more."""
+        """The stop has fired: nothing is armed any more, and what was asked for since then was of before."""
+        self._stop.anew()
         self.wanted, self._tails, self.armed = {}, {}, {}
 
     def release(self) -> None:
         """Nothing stops the axis any more: it is at fault, or what moved it is over."""
         if self.armed:
             self._stop.disarm()
-        self.fired()
+        self.wanted, self._tails, self.armed = {}, {}, {}

@@ -125,6 +125,13 @@ class Stop:
         """Nothing stops the stepper any more. A trigger that is on its way already still comes as an event."""
         self.arm({}, 0)
 
+    def anew(self) -> None:
+        """Its event is dealt with. What was armed since it fired begins too late, and must not pass for armed."""
+        self._changes.clear()
+        for name in self._armed:
+            self._off(self._inputs[name])
+        self._armed.clear()
+
     def now(self) -> None:
         """Stop the stepper at once, as an input would: where it has been stopped already, nothing happens to it.
 
