@@ -90,10 +90,9 @@ class AxisLedger:
             return before.shaft + before.direction * entry.last
         return self._shaft if place == len(told) - 1 else None
 
-    def end_told(self, now: Ns, told: list[Motion]) -> None:
-        """The motion that the stepper was told of last, in `told`, ends with what it has given."""
-        if told and isinstance(told[-1], MotionStarted):
-            self.stepper.tell(MotionCut(now, _given(told[-1], now), self.what.axis))
+    def end_told(self, now: Ns) -> None:
+        """The motion that the stepper was told of last ends with what has left."""
+        self.stepper.tell(MotionCut(now, 0, self.what.axis))
 
     def displace(self, by: int) -> None:
         """The shaft, at rest, is elsewhere: as if the last motion had ended there."""
@@ -143,12 +142,15 @@ class AxisLedger:
         What both begin with was told already. Where nothing has left that is not so, the stepper is told of the rest.
         """
         same = alike(old, new)
+        if same == len(old) == len(new):
+            return 0
+        force = self.motion_after(self.motions.count - len(new) + same)
+        first = min(item.at for item in (*old[same : same + 1], *new[same : same + 1]))
+        left, due = _pulses(force, old[same:], first, now), _pulses(force, new[same:], first, now)
+        alright = alike(left, due)
+        if alright < len(left):
+            return len(left) - alright
         if same < len(old):
-            force = self.motion_after(self.motions.count - len(new) + same)
-            first = min(item.at for item in (*old[same : same + 1], *new[same : same + 1]))
-            left, due = _pulses(force, old[same:], first, now), _pulses(force, new[same:], first, now)
-            if left != due[: len(left)]:
-                return len(left)
             last = old[-1]
             if isinstance(last, MotionStarted):
                 self.stepper.tell(MotionCut(now, _given(last, now), self.what.axis))

@@ -228,7 +228,7 @@ class Rollback(Outgoing):
                     continue
                 lost = ledger.tell_difference(old[ledger.name], new, now)
                 if lost:
-                    ledger.end_told(now, old[ledger.name])
+                    ledger.end_told(now)
                     self._contradicted(ledger, stopped, lost)
                 continue
             ledger.stepper.rewind(event.shaft, slipped=bool(event.dry))
