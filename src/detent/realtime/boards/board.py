@@ -303,6 +303,8 @@ class Board:
         if is_config and message.number("crc") & 0xFFFFFFFF == self._equipment.crc():
             if is_shutdown:
                 self._was_down = True
+                for axis in self.steppers.values():
+                    axis.halt()
                 core.command("clear_shutdown")
                 self._ask_config(wall)
                 return
@@ -448,7 +450,7 @@ class Board:
         self.core.forget_questions()
         self._recovering = False
         self._wait_until = self._setting = None
-        self._equipment.fall()
+        self._equipment.fall(shut_down=state is State.SHUT_DOWN)
         self.core.queue.clear(self.core.queue.size)
 
     def _shutdown(self, message: Message, wall: WallNs) -> None:

@@ -111,16 +111,16 @@ class Equipment:
         """The board is ready; `raw` are the levels of its input pins. Outputs are begun one by one."""
         self.inputs.begin(raw, wall)
         for axis in self.steppers.values():
-            axis.halt()
+            axis.halt(stopped=False)
         for wire in self._wires.values():
             wire.clear()
         for driver in self.drivers.values():
             driver.began()
 
-    def fall(self) -> None:
+    def fall(self, *, shut_down: bool) -> None:
         """The board has shut down, or is gone."""
         for axis in self.steppers.values():
-            axis.halt()
+            axis.halt(stopped=shut_down)
         for stop in self.stops.values():
             stop.clear()
         for out in self.outs.values():
@@ -232,11 +232,10 @@ class Equipment:
             at = axis.proof_due()
             if at is not None and wall >= at:
                 axis.prove(wall)
-        dues = self._dues()
         for name, stop in self.stops.items():
             at = stop.deadline()
             if at is not None and wall >= at:
-                stop.behind_steps(dues[name], wall)
+                stop.behind_steps(self._dues()[name], wall)
         for driver in self.drivers.values():
             driver.due(wall)
 

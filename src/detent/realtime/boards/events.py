@@ -82,6 +82,13 @@ class CountDiffers(NamedTuple):
     counted: int
 
 
+class CountEnds(NamedTuple):
+    """The firmware stopped a stepper near the end of its count: where it stands nobody can tell."""
+
+    board: str
+    stepper: str
+
+
 class ShutDown(NamedTuple):
     """The firmware has shut down: outputs at `off`, steppers still, nothing is carried out until `Board.recover`."""
 
@@ -139,6 +146,6 @@ class Refusal(NamedTuple):
 
 
 Event: TypeAlias = (
-    Ready | InputChanged | Stopped | Slipped | Later | CountDiffers | ShutDown | Recovered | Lost | DriverFault
-    | DriverSet | Refusal
+    Ready | InputChanged | Stopped | Slipped | Later | CountDiffers | CountEnds | ShutDown | Recovered | Lost
+    | DriverFault | DriverSet | Refusal
 )  # fmt: skip

@@ -4,6 +4,7 @@ from detent.realtime.boards.axis_ledger import AxisLedger
 from detent.realtime.boards.events import (
     BY_HAND,
     CountDiffers,
+    CountEnds,
     DriverFault,
     DriverSet,
     Event,
@@ -61,6 +62,15 @@ class Failures(Rollback):
                 if ledger.standing is Standing.DRIVEN:
                     self._fault(ledger, f"the board has counted {counted} where the cell has {shaft}")
                     self._place(ledger, counted)
+            case CountEnds(board, stepper):
+                ledger = self._by_stepper[stepper]
+                what = f"board {board} counts no further than 2^30 steps, and was stopped there"
+                remedy = "switch the board off and on, recover, and send it home"
+                if ledger.standing is Standing.FAULT:
+                    self._say(Weight.FAULT, f"{ledger.name}: {what}, so nobody knows where the motor stands; {remedy}")
+                else:
+                    self._fault(ledger, f"{what}, so nobody knows where the motor stands: {remedy}", known=False)
+                ledger.lost, ledger.known = True, False
             case ShutDown(board, reason):
                 if reason != BY_HAND:  # `stop` has said so itself
                     self._board_failed(board, f"board {board} has shut down: {reason}", None)

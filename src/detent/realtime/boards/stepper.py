@@ -12,8 +12,9 @@ from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.outputs.steps import Run, Runs
 from detent.pulses import Train
 from detent.realtime.boards.core import MASK, UNSURE, Core
+from detent.realtime.boards.count import Count
 from detent.realtime.boards.dictionary import Message, Value
-from detent.realtime.boards.events import CountDiffers, Later, Slipped
+from detent.realtime.boards.events import CountDiffers, CountEnds, Later, Slipped
 from detent.realtime.boards.lag import SETTLED, Lag, Late
 from detent.realtime.boards.setup import StepperSetup
 from detent.realtime.boards.undo import Undo
@@ -37,6 +38,14 @@ class _Span:
     shaft: int  # at pulse 0
     anew: bool  # a motion of its own: what was before is over
     not_before: int  # no pulse of it up to this tick: a stop is not in force yet
+    _at: tuple[int, Ns] = (0, 0)
+
+    @property
+    def at(self) -> Ns:
+        """When its next pulse is."""
+        if self._at[0] != self.next:
+            self._at = self.next, self.train.time_of(self.next)
+        return self._at[1]
 
 
 class _Channel:
@@ -44,7 +53,8 @@ class _Channel:
 
     def __init__(self, oid: int, sign: int) -> None:
         self.oid, self.sign = oid, sign
-        self.position = 0  # as the firmware last said
+        self.answer = 0  # as the firmware last said
+        self.count = Count()
         self.forget()
 
     def forget(self) -> None:
@@ -81,6 +91,7 @@ class Stepper:
         self._sent_at: WallNs = 0
         self._not_before = NOWHERE  # no pulse up to this tick: a stop is not in force yet
         self._halted = True  # nothing is sent before `adopt` or `rewind`
+        self._stopped = False  # the firmware has stopped it, and has not just been left with what it had
         self._regaining = False
         self._proved = True  # the count was compared since the last pulse
         self._doubted: tuple[int, WallNs] | None = None  # by how much the count differed, and when that is believed
@@ -237,6 +248,8 @@ class Stepper:
 
     def adopt(self, shaft: int) -> None:
         """The shaft of the axis is `shaft` now, where the firmware stands: at the start, and behind a restart."""
+        for channel in self._channels:
+            channel.count = Count(channel.answer)
         self._offset = shaft - self._counted()
         self.rewind(shaft)
         self._regaining = False
@@ -253,7 +266,7 @@ class Stepper:
         self._spans.clear()
         self._runs = None
         self._told = self._sent = shaft
-        self._halted = False
+        self._halted = self._stopped = False
         self._regaining, self.dried = not slipped, False
         self._proved, self._doubted = False, None
 
@@ -264,7 +277,7 @@ class Stepper:
         span = self._spans[0]
         if span.last is not None and span.next > span.last:
             return None
-        return span.train.time_of(span.next)
+        return span.at
 
     def due(self) -> int | None:
         """The tick before which its next pulse cannot come; None: none is to come, as far as it was told."""
@@ -338,7 +351,7 @@ class Stepper:
     def kept(self) -> Undo:
         """As it is now, again: nothing of what is sent from now on was sent."""
         spans = deque(replace(span) for span in self._spans)
-        channels = [(channel.last, channel.up) for channel in self._channels]
+        channels = [(channel.last, channel.up, channel.count) for channel in self._channels]
         own = (self._own, self._told, self._sent, self._sent_at, self._not_before, self._regaining, self._proved,
                self._through, self._halted, self.said, self.dried)  # fmt: skip
         of = self.of
@@ -347,7 +360,7 @@ class Stepper:
         def undo() -> None:
             self._spans, self._runs = spans, None
             for channel, told in zip(self._channels, channels, strict=True):
-                channel.last, channel.up = told
+                channel.last, channel.up, channel.count = told
             (self._own, self._told, self._sent, self._sent_at, self._not_before, self._regaining, self._proved,
              self._through, self._halted, self.said, self.dried) = own  # fmt: skip
             of.now, of.slips, of.slipped = shared
@@ -402,6 +415,7 @@ class Stepper:
             core.command("queue_step", oid=channel.oid, interval=rest.interval, count=rest.steps, add=rest.add)
             core.queue.take(channel.oid, rest.tick(1))
         channel.last = run.last
+        channel.count = channel.count.sent(run.steps if up else -run.steps)
         self.said = core.link.said
 
     def set_clock(self, wall: WallNs) -> None:
@@ -420,9 +434,13 @@ class Stepper:
 
     # -- what the firmware does
 
-    def halt(self, *, dry: bool = False) -> None:
-        """The firmware has stopped it, or is gone: nothing more is sent until `rewind`. `dry`: its steps were late."""
+    def halt(self, *, dry: bool = False, stopped: bool = True) -> None:
+        """Nothing more is sent until `rewind`. `dry`: its steps were late.
+
+        The firmware has `stopped` it; or it is gone, and makes what it has.
+        """
         self._halted, self.dried = True, dry
+        self._stopped = self._stopped or stopped
         self.said = 0
         self._spans.clear()
         self._runs = None
@@ -433,15 +451,20 @@ class Stepper:
     def position(self, message: Message) -> None:
         """A stepper_position came."""
         for channel in self._channels:
-            if channel.oid == message.number("oid"):
-                channel.position = message.number("pos")
+            if channel.oid != message.number("oid"):
+                continue
+            channel.answer = message.number("pos")
+            if self._halted:
+                if channel.count.doubtful(channel.answer):
+                    self._core.events.append(CountEnds(self.board, self.name))
+                channel.count = channel.count.found(channel.answer, stopped=self._stopped)
 
     def counted(self) -> int:
         """The shaft as the firmware last counted it."""
         return self._counted() + self._offset
 
     def _counted(self) -> int:
-        return sum(channel.sign * channel.position for channel in self._channels)
+        return sum(channel.sign * channel.count.whole(channel.answer) for channel in self._channels)
 
     def proof_due(self) -> WallNs | None:
         """When the count can be compared: at rest, behind the last pulse."""

@@ -9,6 +9,7 @@ from detent.realtime.boards.fake.part import Home, Part, Shutdown
 
 MASK = 0xFFFFFFFF
 POLLS_OF_RETRANSMIT = 0x80
+COUNT_END = 1 << 30
 
 
 class _Move(NamedTuple):
@@ -108,7 +109,12 @@ class Stepper(Part):
 
     def stepper_get_position(self) -> None:
         """Steps taken, + while DIR is high."""
-        self.board.respond("stepper_position", oid=self.oid, pos=self.position)
+        self.board.respond("stepper_position", oid=self.oid, pos=self._answer())
+
+    def _answer(self) -> int:
+        """In 31 bits: beyond 2^30 steps it runs back."""
+        place = (self.position + COUNT_END) & MASK
+        return (place if place <= 2 * COUNT_END else MASK + 1 - place) - COUNT_END
 
     def stepper_stop_on_trigger(self, trsync_oid: int) -> None:
         """Stop when that trigger fires."""
@@ -123,6 +129,7 @@ class Stepper(Part):
         for _ in self.queue:
             self.board.free_move()
         self.queue.clear()
+        self.position = self._answer()  # is what it counts from
         self.count, self.earliest = 0, 0
         self.going_up = self.next_up = self.counting_up = False
         self.need_reset = True
