@@ -85,7 +85,7 @@ class Outgoing:
         self._shift = 0  # of `clock` from the master's time
         self._clock: Clock | None = None  # of the master, as it was last looked at
         self._known: tuple[WallNs, Ns] = (wall(), 0)  # the last time that the master told
-        self.lines = [HeldLine(cell, number, self._horizon) for number in range(len(cell.lines))]
+        self.lines = [HeldLine(cell, number, self._telling) for number in range(len(cell.lines))]
         self.past = Past(cell, self._counts)
         self._committed: WallNs = 0
         self._looked: WallNs = 0
@@ -171,6 +171,10 @@ class Outgoing:
     def _horizon(self) -> Ns:
         """What the cell said up to then may leave."""
         return self._certain() if self.plan.held else self.cell.now
+
+    def _telling(self) -> Ns:
+        """What the cell said up to then may leave: nothing that was said behind an image which has yet to be stored."""
+        return min(self._horizon(), self._stores.first - 1)
 
     def _certain(self) -> Ns:
         """What the cell did up to then is certain: no stop can be earlier that is not known."""
