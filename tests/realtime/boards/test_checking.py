@@ -18,7 +18,7 @@ from detent.realtime.boards.fake.chips import Chips
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.plan import plan
-from detent.ticks import MS
+from detent.ticks import MS, Ns
 
 CELL = """
 [units.x]
@@ -34,16 +34,33 @@ inputs = { EOT = "^gpio10", HOME = "^gpio11", UI1 = "^!gpio12" }
 """
 
 
+class Busy(Wall):
+    """A host that is elsewhere now and then."""
+
+    def __init__(self, away: Callable[[bool], Ns]) -> None:
+        super().__init__()
+        self._away = away
+
+    def look(self, writing: bool = False) -> Ns:
+        self.now += self._away(writing)
+        return self.now
+
+    __call__ = look
+
+
 class Bench:
     """A cell whose machine has a step counter and, if asked, an end of travel from `closed` on."""
 
-    def __init__(self, text: str = CELL, closed: int | None = None, chips: bool = True) -> None:
+    def __init__(
+        self, text: str = CELL, closed: int | None = None, chips: bool = True, away: Callable[[bool], Ns] | None = None
+    ) -> None:
+        """`away`: for how long the computer is elsewhere, at each look at its clock, and (True) within each write."""
         switches = [] if closed is None else [MachineSwitch("x", "gpio10", closed, 10**6, inside=False)]
         self.machine = Machine(axes={"x": MachineAxis("gpio2", "gpio3")}, switches=switches)
         self.fake = FakeBoard(self.machine, moves=400)
         self.fake.chips = Chips() if chips else {}
-        self.wall = Wall()
-        self.port: FakePort = Wire(self.fake, lambda: self.wall.now)
+        self.wall = Wall() if away is None else Busy(away)
+        self.port: FakePort = Wire(self.fake, lambda: self.wall.now if away is None else self.wall.look(True))
         described = parse(text, "cell.toml")
         real = RealPins(lambda news: None, lambda _: self.port, self.wall, self.wall.sleep)
         self.check = Check(Opened(described, no_file, real), described)
@@ -117,6 +134,59 @@ def test_a_computer_that_is_busy_makes_no_check_fail(seed: int, monkeypatch: pyt
     assert bench.machine.axes["x"].position == 0
     assert bench.fake.reason is None
     assert stalls > 3
+
+
+def stalled(seed: int) -> tuple[int, int]:
+    """A jog by a computer that is away at any time, also within a write: stalls, and whether the board gave up.
+
+    All its steps are made, a switch stops it where it closes, and it comes back to where it began; or, where something
+    came too late that has a time and no step before it, that is told and nothing moves any more.
+    """
+    random, on = Random(seed), [False]
+    chance, longest = random.choice([0.005, 0.02]), random.choice([60, 250, 600]) * MS
+    stalls = 0
+
+    def away(writing: bool) -> Ns:
+        nonlocal stalls
+        if not on[0] or random.random() >= chance:
+            return 0
+        stalls += 1
+        return random.randrange(longest)
+
+    closed = random.choice([None, random.randrange(5, 60)])
+    bench = Bench(TMC if seed % 3 == 0 else CELL, closed=closed, away=away)
+    assert isinstance(bench.port, Wire)
+    bench.port.spare_exposed = random.random() < 0.7
+    on[0] = True
+    steps, rate = random.randrange(20, 120), random.randrange(100, 900)
+    made = steps if closed is None else min(steps, closed)
+    legs, trouble = [], ""
+    try:
+        legs = bench.jog(steps, rate)
+    except Trouble as told:
+        trouble = str(told)
+    if trouble:
+        assert "shut down: Timer too close" in trouble
+        assert not bench.port.spare_exposed
+        on[0] = False
+        bench.port.run_to(bench.wall.now + 500 * MS)
+        assert bench.machine.outputs["gpio4"] is True
+        assert all(place <= made for *_, place in bench.machine.steps)
+        return stalls, 1
+    assert [leg.made for leg in legs] == [made, made]
+    assert [place for *_, place in bench.machine.steps] == [*range(1, made + 1), *range(made - 1, -1, -1)]
+    assert bench.fake.reason is None
+    return stalls, 0
+
+
+def test_a_stall_makes_no_check_fail_or_tell_what_is_not_so() -> None:
+    assert sum(stalled(seed)[0] for seed in range(12)) > 12
+
+
+@pytest.mark.slow
+def test_stalls_at_any_time_in_many_checks() -> None:
+    counts = [stalled(seed) for seed in range(100, 500)]
+    assert sum(down for _, down in counts) < 40
 
 
 def test_a_switch_stops_it_in_the_board_and_the_way_back_ends_where_it_began() -> None:
