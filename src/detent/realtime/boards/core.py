@@ -92,7 +92,7 @@ class Core:
 
     def ticks(self, ns: Ns) -> int:
         """A duration in ticks, rounded up."""
-        return -(-ns * self.frequency // SECOND)
+        return -(-ns * self.clock.frequency // SECOND)
 
     def soonest(self, wall: WallNs) -> int:
         """The first tick for which something may still be sent at `wall`."""

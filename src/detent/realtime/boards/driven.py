@@ -123,7 +123,9 @@ class Driven(Failures):
             self._stores.flush(self._horizon())
         if self.cell.now >= self._forgotten + FORGET_EVERY:
             self._forget()
-        moving = any(ledger.motion is not None for ledger in self.ledgers)
+        moving = any(
+            ledger.motion is not None or ledger.guard.armed or not ledger.stepper.resting for ledger in self.ledgers
+        )  # at the pins, too: until the last step a stop may take the cell back
         if moving is not self._was_moving:
             self._was_moving = moving
             self.on_moving(moving)

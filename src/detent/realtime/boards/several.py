@@ -188,7 +188,7 @@ class Boards:
         """When `commit` is wanted though nothing new was told: pulses become certain, outputs fall due."""
         if self._aligned is None:
             return None
-        times = []
+        times, soonest = [], self._committed + self.batch
         for board, _ in self._pairs:
             if board.state is not State.READY:
                 continue
@@ -196,12 +196,14 @@ class Boards:
                 pulse = stepper.next_pulse()
                 if pulse is not None:
                     times.append(self.wall_of(pulse))
+                    if times[-1] <= soonest:
+                        return soonest
             times += [at for out in board.outs.values() if (at := out.pending_at()) is not None]
             if any(driver.waiting for driver in board.drivers.values()) or any(
                 stop.pending for stop in board.stops.values()
             ):
                 times.append(0)
-        return max(min(times), self._committed + self.batch) if times else None
+        return max(min(times), soonest) if times else None
 
     @property
     def starving(self) -> bool:
