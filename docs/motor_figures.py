@@ -84,7 +84,7 @@ def closed_loop(folder: Path) -> None:
             axes.set_title(title, loc="left", fontsize=10)
             axes.set_xlim(0, 720)
             axes.legend(frameon=False, loc="upper left")
-            motor_figures.dress(axes, "time (ms)", "half steps")
+            motor_figures.label_axes(axes, "time (ms)", "half steps")
         motor_figures.save(figure, folder / "motor-closed-loop.png")
 
 
@@ -102,7 +102,7 @@ def damping(folder: Path) -> None:
         axes.set_xlim(-2, 60)
         axes.set_ylim(-0.2, 2.2)
         axes.legend(frameon=False)
-        motor_figures.dress(axes, "time (ms)", "rotor (full steps)")
+        motor_figures.label_axes(axes, "time (ms)", "rotor (full steps)")
         motor_figures.save(figure, folder / "motor-damping.png")
 
 
@@ -120,7 +120,7 @@ def damping_of_pulses(folder: Path) -> None:
         panels[0].plot(run.times * 1e3, run.command, color=GREY, linewidth=0.8, label="command")
         panels[0].set_title("300 full steps, 100 to 400 steps/s", loc="left", fontsize=10)
         panels[0].legend(frameon=False)
-        motor_figures.dress(panels[0], "time (ms)", "full steps")
+        motor_figures.label_axes(panels[0], "time (ms)", "full steps")
         slews = range(2000, 10_001, 500)
         for kind, colour, words in kinds:
             rig = Rig(large, Drive(24, 1.0, HALF, "slow"), Load(large.rotor), damping=kind)
@@ -129,7 +129,7 @@ def damping_of_pulses(folder: Path) -> None:
             panels[1].plot(slews, lost, "o-", color=colour, markersize=3.5, label=words)
         panels[1].set_title("6000 half steps, slow decay: how many of 64 variants lose steps", loc="left", fontsize=10)
         panels[1].legend(frameon=False, loc="center right")
-        motor_figures.dress(panels[1], "slew speed (half steps/s)", "lost (%)")
+        motor_figures.label_axes(panels[1], "slew speed (half steps/s)", "lost (%)")
         motor_figures.save(figure, folder / "motor-pulse-damping.png")
 
 
@@ -148,9 +148,9 @@ def critical_region(folder: Path) -> None:
                 axes.axvspan(corner - 35, corner + 35, color=COLOURS[4], alpha=0.25, linewidth=0)
             axes.set_xlim(0, float(times[-1]))
         panels[0].plot(times, run.speed * 2, color=COLOURS[0])
-        motor_figures.dress(panels[0], "", "rotor (half steps/s)")
+        motor_figures.label_axes(panels[0], "", "rotor (half steps/s)")
         panels[1].plot(times, run.load_angles, color=COLOURS[0], linewidth=0.5)
-        motor_figures.dress(panels[1], "time (ms)", "load angle (el. degrees)")
+        motor_figures.label_axes(panels[1], "time (ms)", "load angle (el. degrees)")
         motor_figures.save(figure, folder / "motor-critical-region.png")
 
 

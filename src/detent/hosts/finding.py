@@ -257,7 +257,7 @@ def _gsc200(one: Pass, address: int | None) -> Generator[Move, Answer, Found | N
 
 def _framed(one: Pass, frames: Frames, command: str, more: float = 0.0) -> Generator[Move, Answer, Answer]:
     yield Clear()
-    return (yield Ask(frames.dress(command), frames.end, one.seconds + more))
+    return (yield Ask(frames.frame(command), frames.end, one.seconds + more))
 
 
 def _module(form: Format, frames: Frames, state: str, position: str) -> Found:

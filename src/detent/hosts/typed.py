@@ -131,7 +131,7 @@ def _(driver: GsC200, line: str, seconds: float = MOTION, heard: Heard = unheard
             return Said(tuple(answers), _meaning(line, text), text[:2] in ERRORS or (text == "B" and line != "F"))
         answer = yield Ask(b"", driver.frames.end, driver.patience + SLOWEST_FRAME)  # a listing: a frame a line
         text = driver.frames.text(answer.data) if answer.whole else None
-    raise BadAnswer(driver.title, "its list of the program was damaged", Spoken(driver.frames.dress(line), answer.data))
+    raise BadAnswer(driver.title, "its list of the program was damaged", Spoken(driver.frames.frame(line), answer.data))
 
 
 def _meaning(line: str, text: str) -> str:

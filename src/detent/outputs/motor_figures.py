@@ -41,7 +41,7 @@ def write_curve(
         axes.axhline(motor.holding_torque, color=PALE, linestyle="--", linewidth=0.9)
         axes.set_ylim(0, 1.2 * motor.holding_torque)
         axes.set_xlim(left=0)
-        dress(axes, f"{drive.winding.name} steps/s", "torque (Nm)")
+        label_axes(axes, f"{drive.winding.name} steps/s", "torque (Nm)")
         axes.legend(frameon=False, loc="upper right")
         fit = f", inductance x{motor.inductance_factor:.2f}" if motor.inductance_factor != 1 else ""
         _head(figure, f"{motor.name}: torque against speed",
@@ -60,7 +60,7 @@ def write_move(path: Path, run: Run, title: str, about: str = "") -> None:
         position.step(times, run.command, where="post", color=COMMAND, linewidth=0.9, label="command")
         position.plot(times, run.rotor, color=ROTOR, label="rotor")
         position.legend(frameon=False, loc="upper left")
-        dress(position, "", "position (full steps)")
+        label_axes(position, "", "position (full steps)")
         angle.plot(times, run.load_angles, color=ROTOR, linewidth=0.9)
         for limit in (-360, 360):
             angle.axhline(limit, color=LOST, linewidth=0.8, linestyle="--")
@@ -68,11 +68,11 @@ def write_move(path: Path, run: Run, title: str, about: str = "") -> None:
         angle.plot(times[worst], run.load_angles[worst], "o", color=LOST, markersize=5)
         most = max(400.0, 1.1 * float(np.abs(run.load_angles).max()))
         angle.set_ylim(-min(most, 1500), min(most, 1500))
-        dress(angle, "", "load angle (el. degrees)")
+        label_axes(angle, "", "load angle (el. degrees)")
         current.plot(times, run.trace[:, 3], color=PHASE_A, linewidth=0.8, label="phase A")
         current.plot(times, run.trace[:, 4], color=PHASE_B, linewidth=0.8, label="phase B")
         current.legend(frameon=False, loc="upper right")
-        dress(current, "time (ms)", "current (A)")
+        label_axes(current, "time (ms)", "current (A)")
         for axes in (position, angle, current):
             axes.set_xlim(times[0], times[-1])
         _head(figure, f"{run.rig.motor.name}: {title}", about or str(run.verdict))
@@ -100,7 +100,7 @@ def _head(figure: "Figure", title: str, about: str) -> None:
     figure.text(0.03, 1 - 0.62 / height, about, fontsize=10, color=GREY)
 
 
-def dress(axes: "Axes", x: str, y: str) -> None:
+def label_axes(axes: "Axes", x: str, y: str) -> None:
     """Words at the axes, a grid, no frame."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from detent.outputs.figures import COLOURS, GREY, INK, style
-from detent.outputs.motor_figures import blank, dress, save
+from detent.outputs.motor_figures import blank, label_axes, save
 
 Floats = npt.NDArray[np.float64]
 LEVELS = 9  # contours of the time
@@ -50,7 +50,7 @@ def write_map(
         axes.plot(*chosen, marker="*", markersize=17, color=COLOURS[0], markeredgecolor="white", linestyle="none",
                   label=f"chosen: {names[0]} {chosen[0]}, {names[1]} {chosen[1]}")  # fmt: skip
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, borderpad=0)  # above: nothing is hidden
-        dress(axes, *labels)
+        label_axes(axes, *labels)
         _plain_ticks(axes)
         bar = figure.colorbar(mesh, cax=figure.add_axes((0.91, 0.1, 0.018, 0.74)))
         bar.set_label("variants that lose steps (%)")
@@ -78,8 +78,8 @@ def write_comparison(path: Path, lines: Sequence[Line], *, title: str, about: st
         speed.set_ylim(bottom=0)
         used.axhline(100, color=GREY, linewidth=0.8, linestyle="--")
         used.axhline(-100, color=GREY, linewidth=0.8, linestyle="--")
-        dress(speed, "", "steps/s")
-        dress(used, "time (ms)", "torque used (% of pull-out)")
+        label_axes(speed, "", "steps/s")
+        label_axes(used, "time (ms)", "torque used (% of pull-out)")
         save(figure, path)
 
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.controllers.genstepper.boards import Board
 
-from detent.controllers.genstepper.link import LARGEST, Value, answer, undress
+from detent.controllers.genstepper.link import LARGEST, Value, answer, unframe
 from detent.ticks import SECOND
 
 
@@ -103,5 +103,5 @@ def test_page_39_the_form_of_answers():
     assert answer((), 1) == "\r\n*"
     assert answer(("X,-1,0", "Y,-1,0"), 0) == "X,-1,0\r\nY,-1,0*"
     assert answer(("X,-1,0",), 3) == "\r\nX,-1,0\r\n*"
-    assert undress(b"\r\nX,-1,0\r\n*") == ["X,-1,0", "*"]
-    assert undress(b"X,-1,0*L,16*\r") == ["X,-1,0", "*", "L,16", "*"]
+    assert unframe(b"\r\nX,-1,0\r\n*") == ["X,-1,0", "*"]
+    assert unframe(b"X,-1,0*L,16*\r") == ["X,-1,0", "*", "L,16", "*"]

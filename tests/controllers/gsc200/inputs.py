@@ -76,8 +76,8 @@ def programs(model: str, fastest: int = 1000, longest: int = 999_999) -> st.Sear
 NONSENSE = st.sampled_from(["", "Y9", "a", "A9", "+0", "f5", "L", "G", "K1", "jc", "AAAAAAAAAAAAAAAAA", "S 1", "1F"])
 
 
-def _typed(dress: Callable[[str], bytes], texts: list[str], pause: Ns) -> list[tuple[Ns, Char]]:
-    return [(pause, Char(value)) for text in texts for value in dress(text)]
+def _typed(frame: Callable[[str], bytes], texts: list[str], pause: Ns) -> list[tuple[Ns, Char]]:
+    return [(pause, Char(value)) for text in texts for value in frame(text)]
 
 
 def _garbage(values: bytes, damaged: list[int], pause: Ns) -> list[tuple[Ns, Char]]:

@@ -42,7 +42,7 @@ class GenStepper(Board, WithoutPrograms):
 
     def answers(self, data: bytes) -> list[str]:
         """The lines, and the prompts, in what the board sent."""
-        return link.undress(data)
+        return link.unframe(data)
 
     def registers(self, now: Ns) -> dict[str, str]:
         """K, P, R and O of each motor, the mark of M, where a motion leads; A and the step size (!) of both."""

@@ -67,7 +67,7 @@ def answer(lines: Sequence[str], verbose: int) -> str:
     return text + PROMPT
 
 
-def undress(data: bytes) -> list[str]:
+def unframe(data: bytes) -> list[str]:
     """The lines and prompts in what a board sent."""
     text = data.decode("latin-1").replace(PROMPT, f"\n{PROMPT}\n").replace("\r", "\n")
     return [line for line in text.split("\n") if line]

@@ -176,11 +176,11 @@ class GsC200(OneAxis):
 
     def frame(self, text: str) -> bytes:
         """The command line `text` as a host sends it to this module."""
-        return self._link.dress(text, to_module=True)
+        return self._link.frame(text, to_module=True)
 
     def answers(self, data: bytes) -> list[str]:
         """The answers in what this module sent."""
-        return self._link.undress(data)
+        return self._link.unframe(data)
 
     def registers(self, now: Ns) -> dict[str, str]:
         """S, T and R as they were commanded, the rounds of loops by the address of their L, the error that F tells."""
@@ -286,7 +286,7 @@ class GsC200(OneAxis):
         self._answer(f"E{code}", now)
 
     def _answer(self, text: str, now: Ns) -> None:
-        self._transmitter.send(self._link.dress(text), now)
+        self._transmitter.send(self._link.frame(text), now)
 
     def _single(self, frame: Frame, instruction: Instruction, now: Ns) -> None:
         """A delayed command outside a program: executed at once, as a program of one instruction."""

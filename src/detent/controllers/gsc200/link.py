@@ -35,7 +35,7 @@ class Link:
         total = sum(data) & 0x7F
         return total | 0x10 if self.ored else total
 
-    def dress(self, text: str, *, to_module: bool = False) -> bytes:
+    def frame(self, text: str, *, to_module: bool = False) -> bytes:
         """`text` as it goes over the line: with the address (towards a module), the checksum and CR."""
         data = text.encode("ascii", "replace")
         if to_module and self.address is not None:
@@ -44,7 +44,7 @@ class Link:
             data += bytes([self.checksum(data)])
         return data + b"\r"
 
-    def undress(self, data: bytes) -> list[str]:
+    def unframe(self, data: bytes) -> list[str]:
         """The answers in what a module sent, without checksums and CR. A wrong checksum stays, and shows."""
         answers = []
         for line in data.split(b"\r"):

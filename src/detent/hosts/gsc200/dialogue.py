@@ -111,7 +111,7 @@ class Dialogue(Axis):
 
         `more` is how many seconds the answer may take beyond what any may. Raises NoAnswer, BadAnswer, Refused (E1).
         """
-        data = self.frames.dress(command)
+        data = self.frames.frame(command)
         timeout = self.patience + more + self._character * (len(data) + LONGEST)
         if self._stale:
             yield Clear()

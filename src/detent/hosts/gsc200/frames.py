@@ -23,7 +23,7 @@ class Frames(NamedTuple):
         total = sum(data) & 0x7F
         return total | 0x10 if self.ored else total
 
-    def dress(self, command: str) -> bytes:
+    def frame(self, command: str) -> bytes:
         """`command` as it goes out. ValueError if its checksum would end the frame (V2.1 and older)."""
         data = command.encode("ascii")
         if self.address is not None:
