@@ -42,9 +42,9 @@ def test_asm_writes_an_image_hex_or_commands(source: Path, tmp_path: Path, capsy
     output = tmp_path / "out"
     asm("gs-c200s", source, output=output)
     assert output.read_bytes() == IMAGE
-    asm("gs-c200s", source, output=output, format="hex", force=True)
+    asm("gs-c200s", source, output=output, format="hex", overwrite=True)
     assert output.read_text() == "53 0A 00 00 6A 00\n"
-    asm("gs-c200s", source, output=output, format="commands", force=True)
+    asm("gs-c200s", source, output=output, format="commands", overwrite=True)
     assert output.read_text() == "S10\nj0\n"
     capsys.readouterr()
     asm("gs-c200s", source, format="hex")

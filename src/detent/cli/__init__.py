@@ -128,17 +128,13 @@ def main(tokens: Sequence[str] | None = None) -> None:
 def _told(error: "CycloptsError", given: Sequence[str]) -> str:
     """What is wrong with a command line, in one sentence.
 
-    Many programs call `--force` what is `--overwrite` here, where a load may have a force.
+    Where a load may have a force, `--force` is that; elsewhere it means `--overwrite` (see `overwrite`).
     """
     from cyclopts import UnknownOptionError
 
     told = " ".join(str(error).split()) or "this cannot be read"
-    if "--force" not in told or not any(word.split("=")[0] == "--force" for word in given):
-        return told
-    if not isinstance(error, UnknownOptionError):
-        return f"{told} It is a force in N; to write over a file: --overwrite."
-    if any("--overwrite" in argument.names for argument in error.argument_collection):
-        return "Unknown option: --force. Did you mean --overwrite?"
+    if any(word.split("=")[0] == "--force" for word in given) and not isinstance(error, UnknownOptionError):
+        return f"{told} It is a force in N; to write over a file: --overwrite." if "--force" in told else told
     return told
 
 

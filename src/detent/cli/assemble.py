@@ -17,6 +17,7 @@ from detent.assembler import (
     listing,
 )
 from detent.cli.endings import tell
+from detent.cli.overwrite import Overwrite
 from detent.outputs.files import InTheWay, check_outputs, write_whole
 
 FAILED = 1
@@ -29,7 +30,7 @@ def asm(
     *,
     output: Path | None = None,
     format: Literal["image", "hex", "commands"] | None = None,
-    overwrite: bool = False,
+    overwrite: Overwrite = False,
     json: bool = False,
 ) -> None:
     """Assemble a program: labels and comments in, commands or an image out.
@@ -93,7 +94,9 @@ def list_(model: str, file: Path, *, json: bool = False) -> None:
         print(listing(assembly), end="")
 
 
-def disasm(model: str, file: Path, *, output: Path | None = None, overwrite: bool = False, json: bool = False) -> None:
+def disasm(
+    model: str, file: Path, *, output: Path | None = None, overwrite: Overwrite = False, json: bool = False
+) -> None:
     """Turn a program image back into source, with labels for its jumps.
 
     The EEPROM file of a unit that `serve` keeps is taken as well.

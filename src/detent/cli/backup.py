@@ -7,6 +7,7 @@ from errno import EILSEQ
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from detent.cli.overwrite import Overwrite
 from detent.cli.unit import NO_UNIT_OPTIONS, ModelName, PortName, UnitOptions
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def backup(
     port: PortName,
     file: Path,
     *,
-    overwrite: bool = False,
+    overwrite: Overwrite = False,
     json: bool = False,
     unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal, get_args
 
 from detent.cli import VERBS
+from detent.cli.overwrite import Overwrite
 
 
 def models() -> list[str]:
@@ -219,7 +220,7 @@ def without_others(script: str, shell: str) -> str:
 
 
 def install(
-    *, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path | None = None, overwrite: bool = False
+    *, shell: Literal["bash", "zsh", "fish"] | None = None, output: Path | None = None, overwrite: Overwrite = False
 ) -> None:
     """Write the script that completes detent in your shell.
 

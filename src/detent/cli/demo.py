@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from detent.cli.overwrite import Overwrite
+
 if TYPE_CHECKING:
     from detent.cell.cell import Cell
     from detent.cell.description import Description
@@ -17,7 +19,7 @@ LONGEST = 20  # seconds of the others: some of them run for ever
 
 
 def demo(
-    name: str = "drilling", *, output: Path = Path("detent-demo"), overwrite: bool = False, json: bool = False
+    name: str = "drilling", *, output: Path = Path("detent-demo"), overwrite: Overwrite = False, json: bool = False
 ) -> None:
     """Run an example cell, tell what happens, and draw it.
 

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 
 from detent.assembler import Assembly, AssemblyFailed, Language, assemble
 from detent.cli.codes import ASKED_WRONGLY, FAILED
+from detent.cli.overwrite import Overwrite
 from detent.cli.unit import NO_UNIT_OPTIONS, ModelName, PortName, UnitOptions
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def download(
     file: Path | None = None,
     *,
     output: Path | None = None,
-    overwrite: bool = False,
+    overwrite: Overwrite = False,
     json: bool = False,
     unit: UnitOptions = NO_UNIT_OPTIONS,
 ) -> None:

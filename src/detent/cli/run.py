@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
+from detent.cli.overwrite import Overwrite
+
 if TYPE_CHECKING:
     pass
 
@@ -30,7 +32,7 @@ def run(
     pin: Sequence[str] = (),
     line_timing: Annotated[bool, Parameter(negative="--no-line-timing")] = True,
     allow_loss: Annotated[bool, Parameter(negative=())] = False,
-    overwrite: Annotated[bool, Parameter(negative=())] = False,
+    overwrite: Overwrite = False,
     json: bool = False,
 ) -> None:
     """Run a controller or a cell in virtual time and say where everything ended.

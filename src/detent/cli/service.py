@@ -6,9 +6,9 @@ import re
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-from cyclopts import Parameter
+from detent.cli.overwrite import Overwrite
 
 if TYPE_CHECKING:
     from detent.cell.description import Description
@@ -24,7 +24,7 @@ def service(
     user: str | None = None,
     control: str | None = None,
     output: Path | None = None,
-    overwrite: Annotated[bool, Parameter(negative=())] = False,
+    overwrite: Overwrite = False,
     json: bool = False,
 ) -> None:
     """Print a systemd unit that serves a cell from power-on.

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from detent.cli.overwrite import Overwrite
+
 if TYPE_CHECKING:
     from detent.ramps.differences import Curve, Differences
 
@@ -27,7 +29,7 @@ def table(
     bin_: Annotated[Path | None, Parameter(name="--bin")] = None,
     hex_: Annotated[Path | None, Parameter(name="--hex")] = None,
     text: Path | None = None,
-    overwrite: bool = False,
+    overwrite: Overwrite = False,
     option: bool = False,
     json: bool = False,
 ) -> None:
