@@ -10,7 +10,7 @@ from pydantic import Field
 from starlette.websockets import WebSocketDisconnect
 
 import detent.workbench.live
-from detent.workbench.live import MOST_CALLS, Live
+from detent.workbench.live import LATE, MOST_CALLS, Live
 
 
 class Socket:
@@ -202,7 +202,7 @@ def test_a_window_hears_something_where_nothing_changes(live: Live, monkeypatch:
         socket = Socket()
 
         async def beats() -> None:
-            await socket.until(lambda: socket.sent.count({}) >= 3)
+            await socket.until(lambda: sum(message.keys() == {"beat"} for message in socket.sent) >= 3)
 
         await with_window(live, socket, beats)
 
@@ -228,6 +228,40 @@ def test_what_a_window_asks_for_is_done_though_it_leaves_at_once(live: Live) -> 
 
     asyncio.run(run())
     assert done == ["begun", "confirmed"]
+
+
+def test_what_moves_is_not_done_late_and_a_stop_is(live: Live) -> None:
+    done: list[str] = []
+
+    async def move() -> None:
+        done.append("move")
+
+    async def stop() -> None:
+        done.append("stop")
+
+    live.offer("move", move, fresh=True)
+    live.offer("stop", stop)
+
+    async def run() -> None:
+        now = 1000 * asyncio.get_running_loop().time()
+        long_ago = now - 1001 * LATE
+        socket = Socket(
+            {"id": 1, "call": "move", "heard": long_ago},
+            {"id": 2, "call": "stop", "heard": long_ago},
+            {"id": 3, "call": "move", "heard": now},
+            {"id": 4, "call": "move", "heard": None},
+        )
+
+        async def answered() -> None:
+            await socket.until(lambda: sum("id" in message for message in socket.sent) == 4)
+
+        await with_window(live, socket, answered)
+        (refused,) = [message for message in socket.sent if "error" in message]
+        assert refused["id"] == 1
+        assert "it is not done; ask again" in refused["error"]
+
+    asyncio.run(run())
+    assert sorted(done) == ["move", "move", "stop"]
 
 
 def test_a_call_is_offered_once(live: Live) -> None:

@@ -231,7 +231,8 @@ def _offer(bench: "Bench", live: Live) -> None:
             await bench.kill()
             await bench.revive()
 
+    moving = (power, set_pin, set_switch, send, type, start, recover)  # a machine, where the cell drives one
     for action in (pace, faster, slower, step_instruction, step_back, rewind, power, set_switch, set_pin, set_strap,
                  place_switch, send, type, withdraw, start, break_on_errors, hold, go, step_event, breaks, mend,
                  take_branch, compare_branch, restart, stop_motors, recover, revive, end_silent):  # fmt: skip
-        live.offer(action.__name__, action)
+        live.offer(action.__name__, action, fresh=action in moving)

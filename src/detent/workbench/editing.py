@@ -34,7 +34,7 @@ class Editing:
         self._bench, self._live = bench, live
         self._memory: dict[str, tuple[int, bytes]] = {}  # by unit: the count of changes, and what was read then
         for name in CALLS:
-            live.offer(f"program_{name}", getattr(self, name))
+            live.offer(f"program_{name}", getattr(self, name), fresh=name == "load")
         bench.on_change(self._show_breakpoints)
         self._show_breakpoints()
 

@@ -1,9 +1,11 @@
 """What all windows show, as one flat table of keys and values, and the calls that they make.
 
 One socket a window (`/live`). The server pushes what changed since it pushed last, as JSON ``{"set": {KEY: VALUE}}``;
-a window that is slow gets fewer and newer values, never a queue. It hears something every `BEAT` seconds, if only
-``{}``: so a window knows a server that hangs from a cell that stands. A window calls
+a window that is slow gets fewer and newer values, never a queue. It hears something every `BEAT` seconds,
+whatever happens: so a window knows a server that hangs from a cell that stands. A window calls
 ``{"call": NAME, "args": [...], "id": N}`` and gets ``{"id": N, "value": ...}`` or ``{"id": N, "error": TEXT}``.
+What the server says carries a ``beat``, its own clock in ms, and what a window calls the one that it ``heard`` last:
+so what moves something is not done long after it was asked for, when whoever asked has been told that it was not.
 A window that takes no answers is heard no further than `MOST_CALLS` calls.
 """
 
@@ -25,6 +27,7 @@ Call: TypeAlias = Callable[..., Awaitable[object]]
 MISTAKES = (ValueError, KeyError, TypeError, OSError, RuntimeError)  # whose text is for the person at the window
 LONGEST_CALL = 1 << 20  # characters
 BEAT = 1.0  # seconds
+LATE: Final = 10.0  # seconds after which nothing moves any more that was asked for; a window gives up after 20
 MOST_CALLS: Final = 100  # of a window at once; an answer that it has not taken counts
 MOST_LINES: Final = 100  # of an error
 
@@ -36,6 +39,7 @@ class Live:
         self._table: dict[str, Value] = {}
         self._windows: set[_Window] = set()
         self._calls: dict[str, Call] = {}
+        self._fresh: set[str] = set()  # what is not done late
         self._answers: set[asyncio.Task[None]] = set()
 
     @property
@@ -56,11 +60,16 @@ class Live:
             for window in self._windows:
                 window.show(changed)
 
-    def offer(self, name: str, call: Call) -> None:
-        """Let windows call `call` by `name`. Its arguments are checked against its annotations."""
+    def offer(self, name: str, call: Call, *, fresh: bool = False) -> None:
+        """Let windows call `call` by `name`. Its arguments are checked against its annotations.
+
+        A `fresh` one is not done when it comes `LATE`: it moves something. A stop is done however late it is.
+        """
         if name in self._calls:
             raise ValueError(f"there is a call {name!r} already")
         self._calls[name] = validate_call(call)
+        if fresh:
+            self._fresh.add(name)
 
     async def serve(self, socket: WebSocket) -> None:
         """One window, from its socket's opening to its end.
@@ -106,6 +115,8 @@ class Live:
             call = self._calls.get(name)
             if call is None:
                 raise ValueError(f"there is no call {name!r}")
+            if name in self._fresh:
+                _check_fresh(asked.get("heard"))
             answer: dict[str, object] = {"id": number, "value": await call(*arguments)}
         except Exception as error:  # whatever it is: somebody waits for the answer
             answer = {"id": number, "error": _in_words(name, error)}
@@ -113,6 +124,17 @@ class Live:
                 told_of = {"message": f"The call {name} failed", "exception": error}
                 asyncio.get_running_loop().call_exception_handler(told_of)
         await window.reply(answer)
+
+
+def _check_fresh(heard: object) -> None:
+    """Raises RuntimeError where the last that a window had heard of the server is long ago."""
+    if isinstance(heard, int | float) and (away := (_clock() - heard) / 1000) > LATE:
+        raise RuntimeError(f"the workbench was away for {away:.0f} s when this was asked: it is not done; ask again")
+
+
+def _clock() -> int:
+    """The server's own, in ms."""
+    return round(1000 * asyncio.get_running_loop().time())
 
 
 def _in_words(name: str, error: Exception) -> str:
@@ -162,7 +184,9 @@ class _Window:
                     values, self._values = self._values, {}
                     under_way, self._replies = self._replies, []
                     if values or not under_way:
-                        told = {"set": values} if values else {}
+                        told: dict[str, object] = {"beat": _clock()}
+                        if values:
+                            told["set"] = values
                         await self._socket.send_text(json.dumps(told, separators=(",", ":")))
                     for answer, taken in under_way:
                         await self._socket.send_text(json.dumps(answer, separators=(",", ":"), default=_plain))

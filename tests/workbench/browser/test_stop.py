@@ -1,5 +1,6 @@
 """STOP in a real browser: reached from everywhere, told where it is not confirmed, and two presses of Esc."""
 
+import json
 import os
 import signal
 from typing import Any
@@ -90,9 +91,13 @@ def test_a_stop_that_is_not_confirmed_stands_above_the_page(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
     with served(tmp_path_factory.mktemp("hung"), "dcb-274") as hung:
-        window = windows.new(hung).open("/")
+        window, sent = windows.new(hung), list[str]()
+        window.page.on("websocket", lambda socket: socket.on("framesent", lambda data: sent.append(str(data))))
+        window.open("/")
         window.call("unit_connect", "dcb-274", hung.endpoints[0]["address"], "patience=10")
         window.page.locator("header").get_by_role("button", name="STOP", exact=True).wait_for()
+        (asked,) = [json.loads(text) for text in sent if "unit_connect" in text]
+        assert asked["heard"] > 0, "by it the server knows what comes late"
         os.kill(hung.process.pid, signal.SIGSTOP)
         try:
             window.page.locator("header").get_by_role("button", name="STOP", exact=True).click()

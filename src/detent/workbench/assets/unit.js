@@ -193,8 +193,9 @@ part("unit", (box) => {
     role("position").classList.toggle("unknown", unknown);
     role("steps").textContent = unknown ? (told.last === null ? "" : `last told: ${grouped(told.last)}`) : told.can.unit;
     role("place").textContent = !unknown && lead() ? `${(told.position / lead()).toFixed(3)} ${role("measure").value}` : "";
-    role("rate").textContent = told.rate === null ? "" : grouped(Math.round(told.rate));
-    role("rate-unit").textContent = told.rate === null ? "" : `${told.can.unit}/s`;
+    const rate = told.moving === false ? null : told.rate; // a board at rest tells the rate from which it would begin
+    role("rate").textContent = rate === null ? "" : grouped(Math.round(rate));
+    role("rate-unit").textContent = rate === null ? "" : ` ${told.can.unit}/s`;
     role("speed-unit").textContent = `${told.can.unit}/s`;
     const print = JSON.stringify(told.facts);
     if (print !== seen) {

@@ -27,6 +27,8 @@ const MUTE = 3000; // ms without a word of the server, which speaks every second
 const GIVEN_UP = 20000; // ms: then a new connection is tried, as this one may have been lost on its way
 /** @type {WebSocket | null} */
 let socket = null;
+/** @type {number | null} the clock of the server, as it was heard last: it does nothing late that moves something */
+let beat = null;
 const silence = new Silence(MUTE, performance.now());
 let calls = 0;
 let pause = 250; // ms before the next attempt to connect
@@ -45,6 +47,7 @@ function connect() {
   mine.onmessage = (event) => {
     silence.heard(performance.now());
     const told = JSON.parse(event.data);
+    if ("beat" in told) beat = told.beat;
     const asked = waiting.get(told.id);
     if (told.set) take(told.set);
     else if (asked) {
@@ -94,7 +97,7 @@ async function say(name, args) {
   return new Promise((resolve, reject) => {
     calls += 1;
     waiting.set(calls, [resolve, reject]);
-    socket?.send(JSON.stringify({ call: name, args, id: calls }));
+    socket?.send(JSON.stringify({ call: name, args, id: calls, heard: beat }));
   });
 }
 

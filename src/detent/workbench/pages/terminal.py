@@ -66,7 +66,7 @@ def offer(site: "FastAPI", bench: "Bench", live: Live) -> None:
         scripts.stop(line)
 
     for call in (terminal, run_script, repeat_command, stop_script):
-        live.offer(call.__name__, call)
+        live.offer(call.__name__, call, fresh=call in (run_script, repeat_command))
 
 
 def _row(row: Row) -> LineRow:

@@ -41,6 +41,7 @@ Text = Annotated[str, Field(max_length=1 << 20)]
 Rate = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
 ManualMove = Literal["jog", "go", "zero", "home"]
 MOST = 16  # units at once
+MOVING = ("unit_move", "unit_hold", "unit_say", "unit_lines", "unit_both", "unit_store", "unit_restore")  # a real unit
 
 
 class Units:
@@ -57,7 +58,7 @@ class Units:
                      self.unit_both, self.unit_move, self.unit_hold, self.unit_held, self.unit_stop,
                      self.unit_asking, self.unit_talk, self.unit_source, self.unit_compare, self.unit_store,
                      self.unit_backup, self.unit_differs, self.unit_restore):  # fmt: skip
-            live.offer(call.__name__, call)
+            live.offer(call.__name__, call, fresh=call.__name__ in MOVING)
 
     # -- connecting --------------------------------------------------------------------------------------
 
@@ -149,7 +150,7 @@ class Units:
         questions = unit.tap.transcript.questions
         rows = [row for row in unit.tap.transcript.since(begin).rows if row.number not in questions]
         return [
-            f"{_text(row)} · {row.note}" if row.note else _text(row)
+            f"{_text(row)} · {row.note.rstrip('.')}" if row.note else _text(row)
             for row in rows
             if row.sender == HOST and row.number not in unit.tap.transcript.questions
         ]
