@@ -5,7 +5,7 @@ their lines, and what the hosts of the lines heard goes out. Characters count as
 line then gives them their time. Then the loop sleeps until the next deadline of the cell or the next byte.
 
 It sleeps to the microsecond (`realtime.polling`). What remains after that (`EARLY`) is spent looking at the descriptors
-again and again.
+again and again, and nothing else for a while, so that what is due is seen sooner.
 """
 
 import contextlib
@@ -28,6 +28,7 @@ from detent.ticks import MS, SECOND, US, Ns
 from detent.uart import Chars
 
 EARLY: WallNs = 60 * US  # sleeping is given up so long before a deadline: no system wakes a sleeper to the microsecond
+LOOKS = 64  # in a row, before the rest is seen to again
 LONGEST_SLEEP: WallNs = 3600 * SECOND  # systems refuse to sleep for years, and nobody minds a wake-up an hour
 LONGEST: WallNs = 2 * MS  # a cell that cannot keep pace lets the clients have a word so often
 BEHIND = 64  # characters waiting on a line before its clients have to wait
@@ -134,6 +135,7 @@ class Loop:
             else:
                 self._of_line[line].append(endpoint)
         self._patience = list(patience) if patience is not None else [0] * len(cell.lines)
+        self._looking: WallNs = 0  # until when nothing is done but to look at the descriptors; 0: not at all
         self._stopping = False
         self._closed = False
         self._asked: deque[tuple[Callable[[], Any], Future[Any]]] = deque()  # of other threads
@@ -214,9 +216,12 @@ class Loop:
         if companion is not None:
             beside = companion.reading(), companion.writing()
 
-        readable, writable, _ = self._wait(
-            [*readers, *beside[0]], [*writers, *beside[1]], (), self._timeout()
-        )  # fmt: skip
+        reading, writing = [*readers, *beside[0]], [*writers, *beside[1]]
+        readable, writable, _ = self._wait(reading, writing, (), self._timeout())
+        for _ in range(LOOKS):
+            if readable or writable or companion is not None or not 0 < self._looking - clock() <= EARLY:
+                break
+            readable, writable, _ = self._wait(reading, writing, (), 0.0)
         self._catch_up()
         if companion is not None:
             for descriptor in beside[0]:
@@ -254,6 +259,7 @@ class Loop:
         """Seconds to sleep at most; None if only a client can start anything."""
         at = self._cell.next_event()
         due = None if at is None else self._pace.due(at)
+        self._looking = 0 if due is None else due
         if due is not None:
             due -= EARLY
         for _, endpoint in self._endpoints:
