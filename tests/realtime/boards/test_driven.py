@@ -303,7 +303,7 @@ def test_an_unplugged_board_ends_within_the_lead_and_comes_back() -> None:
         assert state.standing is Standing.FAULT
         assert "board b is gone" in state.why
         assert not state.known
-        assert after <= state.shaft <= after + 3, "what was sent was carried out, but for the last batch"
+        assert after <= state.shaft <= after + 4, "what was sent was carried out, but for the last batch"
         bench.driven.recover()
         bench.run(300 * MS)
         assert bench.driven.axes()[0].standing is Standing.FAULT, "it is not there yet"

@@ -104,9 +104,10 @@ class Driven(Failures):
         if events or over or wall - self._looked >= self.boards.batch:
             self._looked = wall
             self._look()
-        if self.boards.starving or (
-            wall - self._committed >= self.boards.batch
-            and (self._pending or ((wanted := self.boards.commit_at()) is not None and wanted <= wall))
+        if (
+            self.boards.starving
+            or (self._pending and wall - self._committed >= self.boards.batch)
+            or ((wanted := self.boards.commit_at()) is not None and wanted <= wall)
         ):
             self.commit()
             for event in self.boards.events():

@@ -10,7 +10,7 @@ from detent.outputs.steps import Error
 from detent.ticks import MS, SECOND, US, Ns
 
 SHORTEST_BATCH: Ns = 1 * MS
-LONGEST_BATCH: Ns = 3 * MS
+LONGEST_BATCH: Ns = 4 * MS
 
 
 class SetupProblem(ValueError):
@@ -147,8 +147,8 @@ class BoardSetup:
 
     @property
     def batch(self) -> Ns:
-        """So long pulses are gathered, while there is time: longer runs, and less work; a tenth of the lead."""
-        return min(max(self.lead // 10, SHORTEST_BATCH), LONGEST_BATCH)
+        """So long pulses are gathered, while there is time: longer runs, and less work; an eighth of the lead."""
+        return min(max(self.lead // 8, SHORTEST_BATCH), LONGEST_BATCH)
 
     def items(self) -> "list[Item]":
         """Everything on it that has a name and pins."""

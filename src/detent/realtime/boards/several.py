@@ -25,6 +25,7 @@ from detent.ticks import MS, SECOND, Ns
 REOPEN_EVERY: WallNs = 250 * MS
 REDRAW_EVERY: Ns = SECOND
 MEETING: Ns = 2 * SECOND
+AT_ONCE: WallNs = 1 * MS  # between two commits at least, where a change of an output is due
 FINER = 5  # bits of the fraction of a tick in the slope of another board
 
 
@@ -188,22 +189,25 @@ class Boards:
         """When `commit` is wanted though nothing new was told: pulses become certain, outputs fall due."""
         if self._aligned is None:
             return None
-        times, soonest = [], self._committed + self.batch
+        soonest = self._committed + self.batch
+        times: list[WallNs] = []
+        outs: list[WallNs] = []  # these have their times, and wait for no batch
         for board, _ in self._pairs:
             if board.state is not State.READY:
                 continue
+            outs += [at for out in board.outs.values() if (at := out.pending_at()) is not None]
             for stepper in board.steppers.values():
-                pulse = stepper.next_pulse()
+                pulse = None if times and times[-1] <= soonest else stepper.next_pulse()
                 if pulse is not None:
                     times.append(self.wall_of(pulse))
-                    if times[-1] <= soonest:
-                        return soonest
-            times += [at for out in board.outs.values() if (at := out.pending_at()) is not None]
             if any(driver.waiting for driver in board.drivers.values()) or any(
                 stop.pending for stop in board.stops.values()
             ):
                 times.append(0)
-        return max(min(times), soonest) if times else None
+        found = [max(min(times), soonest)] if times else []
+        if outs:
+            found.append(max(min(outs), self._committed + AT_ONCE))
+        return min(found, default=None)
 
     @property
     def starving(self) -> bool:
