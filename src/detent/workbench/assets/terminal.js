@@ -212,7 +212,10 @@ part("terminal", (box) => {
     const every = role("every").value;
     try {
       if (every && to.value !== RAW) await call("repeat_command", line, to.value, written, Number(every));
-      else if (to.value === RAW) await call("send", line, bytes(written));
+      else if (to.value === RAW) {
+        await call("send", line, bytes(written));
+        if (every) toast("Bytes are sent once: what is sent again and again is a command to a unit.");
+      }
       else await call("type", to.value, written);
       toEnd();
       look();
