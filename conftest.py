@@ -45,7 +45,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Tests that share a fixture of their file run in one process under `pytest --dist loadgroup`: it is made once.
 
-    A group is the end of a name, behind `@`. What xdist writes there for a mark, pytest 9 does not read.
+    A group is the end of a name, behind `@`: the file, or what a mark says (what xdist writes there for one, pytest 9
+    does not read).
     """
     if not config.getoption("loadgroup", False):  # set in a worker only
         return
@@ -53,7 +54,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         shared = getattr(item, "_fixtureinfo", None)
         fixtures = [found for all_ in shared.name2fixturedefs.values() for found in all_] if shared else []
         if any(one.scope in ("class", "module", "package") and one.baseid for one in fixtures):
-            named = f"{item.nodeid}@{item.path.relative_to(ROOT)}"
+            mark = item.get_closest_marker("xdist_group")
+            named = f"{item.nodeid}@{mark.args[0] if mark else item.path.relative_to(ROOT)}"
             item._nodeid = named  # noqa: SLF001
             if hasattr(item, "_id"):  # pytest 9
                 item._id = type(item._id).parse(named)  # noqa: SLF001

@@ -63,9 +63,9 @@ def serve(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Se
         yield start
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def drilling(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """The workbench as it opens without a word: the drilling cell, running."""
+    """The workbench as it opens without a word: the drilling cell, running until the tests of this folder are done."""
     with served(tmp_path_factory.mktemp("workbench")) as found:
         yield found
 
