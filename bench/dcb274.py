@@ -1,7 +1,9 @@
 """The DCB-274: what an index costs by its length, and 32 axes on one saturated party line."""
 
 import time
+from collections.abc import Iterator
 from statistics import median
+from typing import NamedTuple
 
 from bench.rows import Row, print_table
 from detent.cell.build import build
@@ -13,14 +15,16 @@ from detent.uart import Char
 
 LONG, SHORT = 16_777_215, 1_000
 MOVES = 200
-POLLED_FOR, PARTS = SECOND // 10, 10  # virtual time
+POLLED_FOR, PARTS = SECOND // 20, 20  # virtual time
 NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdef"
 
 
 def rows() -> list[Row]:
     long, short = _indexes()
-    (share, lost, polls), (alone, *_) = _party_line("on", NAMES), _party_line("on", NAMES[:1])
-    bare, lost_bare, polls_bare = _party_line("off", NAMES)
+    lines = _party_line("on", NAMES), _party_line("on", NAMES[:1]), _party_line("off", NAMES)
+    turns = [tuple(map(next, lines)) for _ in range(PARTS)]
+    share, alone, bare = (min(part.share for part in parts) for parts in zip(*turns, strict=True))
+    (_, polls, lost), _, (_, polls_bare, lost_bare) = turns[-1]
     return [
         Row(f"index of {LONG} steps", long, "us", f"of {SHORT} steps", short, 1.2 * short),
         Row(f"{len(NAMES)} axes polled, 460 800 baud, {polls}/s", 100 * share, "% of a core", "all of it", 100, 30),
@@ -59,21 +63,28 @@ def _cell(times: str, names: str) -> Cell:
     text = []
     for name in names:
         options = f'options = {{ name = "{name}", execution_times = "{times}" }}'
-        text += [f"[units.u{ord(name)}]", 'model = "dcb-274"', options, 'straps = { B1 = "high" }']
+        text += [f"[units.u{ord(name)}]", 'model = "dcb-274"', options, 'straps = { B1 = "high", PARTY = "high" }']
     units = [f"u{ord(name)}" for name in names]
     return build(parse("\n".join([*text, "[lines.bus]", f"units = {units}"]), "bench"), lambda file: "", record=False)
 
 
-def _party_line(times: str, names: str) -> tuple[float, int, int]:
-    """Share of a core, characters lost and polls, when each axis is asked for its position, one after the other.
+class Part(NamedTuple):
+    """Of a line that is polled: the share of a core that a part of it took, and polls and lost characters so far."""
+
+    share: float
+    polls: int
+    lost: int
+
+
+def _party_line(times: str, names: str) -> Iterator[Part]:
+    """Each axis is asked for its position, one after the other, part after part without an end.
 
     The host does the handshake: it sends the next character in the instant in which the echo is there, so the line
-    never rests but for the axes' own time. The share is the least of `PARTS` parts of it.
+    never rests but for the axes' own time.
     """
     cell = _cell(times, names)
     polls = lost = 0
-    shares = []
-    for _ in range(PARTS):
+    while True:
         begin, start = time.process_time(), cell.now
         while cell.now - start < POLLED_FOR:
             for character in (names[polls % len(names)], "Z", "\n"):
@@ -85,8 +96,7 @@ def _party_line(times: str, names: str) -> tuple[float, int, int]:
                         break
                     heard += bytes(each.char.value for each in cell.lines[0].take())
             polls += 1
-        shares.append((time.process_time() - begin) / ((cell.now - start) / SECOND))
-    return min(shares), lost, polls
+        yield Part((time.process_time() - begin) / ((cell.now - start) / SECOND), polls, lost)
 
 
 if __name__ == "__main__":
