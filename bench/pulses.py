@@ -10,13 +10,12 @@ from fractions import Fraction
 from functools import partial
 from importlib.util import find_spec
 from math import isqrt
-from statistics import median
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.rows import Row, measure, print_table
+from bench.rows import Row, least, measure, print_table
 from detent.pulses import Accelerating, Table, Ticked, Train, Uniform, arrays
 from detent.ramps.constant_acceleration import move
 from detent.ticks import SECOND, to_fixed
@@ -113,11 +112,11 @@ def first_rate(ramp: int, steps: int) -> float:
     taken = []
     for _ in range(9):
         trains = [move.__wrapped__(100, 10_000, ramp, n).train for n in range(steps - 50, steps + 50)]
-        begin = perf_counter()
+        begin = process_time()
         for train in trains:
             train.times()
-        taken.append(perf_counter() - begin)
-    return 100 * steps / median(taken) / MEGA
+        taken.append(process_time() - begin)
+    return 100 * steps / min(taken) / MEGA
 
 
 def query_rows() -> list[Row]:
@@ -130,13 +129,13 @@ def query_rows() -> list[Row]:
         n, t = rng.integers(1, steps + 1, 1_000_000), rng.integers(0, end, 1_000_000)
         some_n, some_t = n[:20_000].tolist(), t[:20_000].tolist()
         ends = np.linspace(0, end, count).astype(np.int64).tolist()
-        bisection = 20_000 / measure(partial(ask_each, partial(bisect_right, ends), some_t)) / MEGA
+        bisection = 20_000 / least(partial(ask_each, partial(bisect_right, ends), some_t)) / MEGA
         rates = {
-            "time_of": 20_000 / measure(partial(ask_each, train.time_of, some_n)),
-            "steps_by": 20_000 / measure(partial(ask_each, train.steps_by, some_t)),
-            "state_at": 20_000 / measure(partial(ask_each, train.state_at, some_t)),
-            "times_of": 1_000_000 / measure(partial(train.times_of, n)),
-            "counts_by": 1_000_000 / measure(partial(train.counts_by, t)),
+            "time_of": 20_000 / least(partial(ask_each, train.time_of, some_n)),
+            "steps_by": 20_000 / least(partial(ask_each, train.steps_by, some_t)),
+            "state_at": 20_000 / least(partial(ask_each, train.state_at, some_t)),
+            "times_of": 1_000_000 / least(partial(train.times_of, n)),
+            "counts_by": 1_000_000 / least(partial(train.counts_by, t)),
         }
         targets = {"times_of": 5.0, "counts_by": 5.0}
         if count == 100:
