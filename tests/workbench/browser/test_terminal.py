@@ -89,6 +89,22 @@ def test_a_script_with_a_mistake_says_the_line_and_sends_nothing(terminal: Windo
     assert terminal.page.locator(".said").count() == 0
 
 
+def test_a_tab_that_is_chosen_again_takes_nothing_back_that_is_typed(terminal: Window) -> None:
+    """Each choice asks for the draft: the answer to the first one may not open the field to what the next overwrites."""
+    terminal.call("keep_draft", "script.bar", "+1\n", "")
+    terminal.page.evaluate("""async () => {
+        const [tab, script] = ["[data-line=bar]", "[data-role=script]"].map((one) => document.querySelector(one));
+        tab.click();
+        tab.click();
+        const opened = new Promise((done) => new MutationObserver(done).observe(script, { attributes: true }));
+        while (script.readOnly) await opened;
+        script.value = "+2\\n";
+        script.dispatchEvent(new Event("input", { bubbles: true }));
+    }""")
+    terminal.call("draft", "script.bar")  # answered behind the others
+    assert terminal.page.get_by_role("textbox", name="Script").input_value() == "+2\n"
+
+
 def test_scripts_are_opened_and_saved_in_the_chosen_folder_only(terminal: Window, workbench: Served) -> None:
     script, file = (
         terminal.page.get_by_role("textbox", name="Script"),

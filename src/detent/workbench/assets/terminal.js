@@ -238,14 +238,15 @@ part("terminal", (box) => {
   // -- a script --
 
   const draftName = () => `script.${line}`;
+  let draftsAsked = 0;
 
   async function showScript() {
-    const mine = line;
+    const mine = ++draftsAsked;
     script.value = role("file").value = "";
     renumber();
     script.readOnly = true; // what is typed now the draft would overwrite
     const draft = await call("draft", draftName()).catch(() => null);
-    if (mine !== line) return;
+    if (mine !== draftsAsked) return; // another line is shown, or this one anew
     script.readOnly = false;
     if (!draft) return;
     script.value = draft.text;
