@@ -11,6 +11,8 @@ from tests.realtime.boards.bench import ENABLE, EOT, MOV, SLIDE, Bench, bench, s
 
 from detent.ramps import constant_acceleration
 from detent.realtime.boards.board import State
+from detent.realtime.boards.core import Core
+from detent.realtime.boards.dictionary import Message
 from detent.realtime.boards.events import CountDiffers, Lost, Ready, Recovered, Refusal, ShutDown, Stopped
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import MachineSwitch
@@ -190,7 +192,7 @@ def test_a_board_that_falls_silent_is_lost() -> None:
     assert [event.reason for event in made.of(Lost)] == ["it does not answer any more"]
 
 
-@pytest.mark.parametrize("late", [2 * MS, 8 * MS, 25 * MS, 90 * MS])
+@pytest.mark.parametrize("late", [2 * MS, 8 * MS, 25 * MS, 90 * MS, 400 * MS])
 def test_a_board_whose_clock_falls_behind_has_lost_no_step(late: int) -> None:
     """Its last steps come later than the host thinks: the count is looked at again before it is believed."""
     made = bench()
@@ -200,6 +202,45 @@ def test_a_board_whose_clock_falls_behind_has_lost_no_step(late: int) -> None:
     made.rest()
     assert made.boards.steppers["slide"].counted() == 300
     assert not made.of(CountDiffers)
+
+
+@pytest.mark.parametrize("delay", [30 * MS, 90 * MS, 250 * MS])
+def test_answers_on_a_slow_wire_are_not_taken_for_later_ones(delay: int) -> None:
+    """A question is asked again every 40 ms: of a clock, answers to those would say that it stands."""
+    port = FakePort(FakeBoard(slide()), delay=delay)
+    made = Bench([(setup(), port)], start=False)
+    made.boards.start(made.wall)
+    made.until(lambda: made.boards.ready, 200 * SECOND)
+    core = made.boards.master.core
+    for _ in range(12):
+        made.run(500 * MS)
+        assert abs(core.clock.tick_at(made.wall) - port.tick_at(made.wall)) < core.ticks(5 * MS)
+
+
+def test_a_count_of_before_a_stop_is_no_count_behind_it() -> None:
+    """It was asked for again on a slow wire, and its second answer comes when another one is asked for."""
+    core = Core(setup())
+    core.dictionary = FakeBoard().dictionary
+    found: list[int] = []
+
+    def come(known: int, count: int) -> None:
+        core.known = known
+        core.answered(Message("stepper_position", {"oid": 1, "pos": count}), 0)
+
+    def ask() -> None:
+        core.ask(
+            "stepper_get_position", "stepper_position", lambda message, _: found.append(message.number("pos")), 0, oid=1
+        )
+
+    ask()
+    core.link.acknowledged = 1  # it was taken, and its answer lost
+    core.due(50 * MS)
+    come(1, 10)
+    ask()
+    come(2, 10)
+    assert found == [10]
+    come(3, 12)
+    assert found == [10, 12]
 
 
 def test_steps_that_went_missing_are_told_at_rest() -> None:

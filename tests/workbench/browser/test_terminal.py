@@ -90,7 +90,7 @@ def test_a_script_with_a_mistake_says_the_line_and_sends_nothing(terminal: Windo
 
 
 def test_a_tab_that_is_chosen_again_takes_nothing_back_that_is_typed(terminal: Window) -> None:
-    """Each choice asks for the draft: the answer to the first one may not open the field to what the next overwrites."""
+    """Each choice asks for the draft: the answer to the first opens no field that the next overwrites."""
     terminal.call("keep_draft", "script.bar", "+1\n", "")
     terminal.page.evaluate("""async () => {
         const [tab, script] = ["[data-line=bar]", "[data-role=script]"].map((one) => document.querySelector(one));

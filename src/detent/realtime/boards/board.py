@@ -62,6 +62,7 @@ class Board:
         self._equipment = has = Equipment(core)
         self.steppers, self.stops, self.outs, self.drivers = has.steppers, has.stops, has.outs, has.drivers
         self._probes = Probes(core)
+        core.look_at_clock = self._probes.ask
         self._handlers = {
             "shutdown": self._shutdown, "is_shutdown": self._shutdown, "trsync_state": self._trsync,
             "buttons_state": self._button, "starting": self._restarted,

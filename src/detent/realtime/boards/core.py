@@ -67,6 +67,8 @@ class _Question:
     then: Callable[[Message, WallNs], None]
     again_at: WallNs
     left: int  # times that it is asked again
+    said: int  # messages up to it: an answer of a board that did not know them is to an earlier one
+    again: int  # the same, as it was said last
 
 
 class Core:
@@ -83,6 +85,7 @@ class Core:
         self.slips = 0
         self.known = 0  # so many messages of ours had come when the board said what is looked at now
         self.earliest: int | None = None  # of the ticks for which something was said since this was None
+        self.look_at_clock: Callable[[WallNs], None] = lambda wall: None  # ask the board what its clock says, now
         self._questions: dict[tuple[str, int], _Question] = {}
 
     @property
@@ -126,13 +129,14 @@ class Core:
     ) -> None:  # fmt: skip
         """Send the command `name` until the response `answer` (of the same oid, if it has one) has come, then tell it.
 
-        A question that is open already is asked anew, and its answer goes to the new asker.
+        A question that is open already is asked anew, and its answer goes to the new asker. What comes as an answer to
+        one before, which was asked again as the wire was slow, is none to this.
         """
         message = self.dictionary.encode(name, **values)
         oid = values.get("oid", -1)
         assert isinstance(oid, int)
-        self._questions[answer, oid] = _Question(message, then, wall + ASK_AGAIN, times)
         self.link.send(message)
+        self._questions[answer, oid] = _Question(message, then, wall + ASK_AGAIN, times, self.link.said, self.link.said)
 
     def asking(self, answer: str, oid: int) -> bool:
         """Whether that answer is awaited."""
@@ -142,9 +146,10 @@ class Core:
         """Give a response to who asked; whether somebody had."""
         oid = message.values.get("oid", -1)
         assert isinstance(oid, int)
-        question = self._questions.pop((message.name, oid), None)
-        if question is None:
+        question = self._questions.get((message.name, oid))
+        if question is None or self.known < question.said:
             return False
+        del self._questions[message.name, oid]
         question.then(message, wall)
         return True
 
@@ -169,7 +174,10 @@ class Core:
         return min((question.again_at for question in self._questions.values()), default=None)
 
     def due(self, wall: WallNs) -> str | None:
-        """Ask again what has waited long enough; the name of an answer that never came."""
+        """Ask again what has waited long enough; the name of an answer that never came.
+
+        A question that was not taken yet is still on its way, however slow that is: what it needs the link does.
+        """
         for key, question in list(self._questions.items()):
             if wall < question.again_at:
                 continue
@@ -178,5 +186,7 @@ class Core:
                 return key[0]
             question.left -= 1
             question.again_at = wall + ASK_AGAIN
-            self.link.send(question.message)
+            if self.link.acknowledged >= question.again:
+                self.link.send(question.message)
+                question.again = self.link.said
         return None

@@ -84,11 +84,6 @@ class Link:
             room = min(room, self.window - SMALLEST * blocks - self._bytes_under_way)
         return room - sum(map(len, self._waiting)) if self._waiting else room
 
-    @property
-    def backlog(self) -> int:
-        """Messages that wait for room under way."""
-        return len(self._waiting)
-
     def sync(self, wall: WallNs) -> None:
         """Ask for the number that the board expects; again until it has answered."""
         self._out += bytes((END,)) + block(0, b"")

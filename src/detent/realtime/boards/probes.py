@@ -18,13 +18,13 @@ class Probes:
     def __init__(self, core: Core) -> None:
         self.at: WallNs | None = None
         self._core = core
-        self._sent: tuple[WallNs, int] | None = None  # when, and how much had been sent again up to there
+        self._sent: WallNs = 0
         self._left = 0
         self._then: Callable[[WallNs], None] = lambda wall: None
 
     def clear(self) -> None:
         """The board is to be asked for everything anew."""
-        self.at = self._sent = None
+        self.at = None
 
     def begin(self, wall: WallNs, then: Callable[[WallNs], None]) -> None:
         """Ask how long it has been running, and the first few times what its clock says; `then` it is known."""
@@ -44,22 +44,19 @@ class Probes:
         self.ask(wall)
 
     def ask(self, wall: WallNs) -> None:
-        """Ask for the clock; a round trip that was not disturbed counts."""
+        """Ask for the clock."""
         core = self._core
         self.at = wall + EVERY
         if core.asking("clock", -1):
             return  # it has not answered yet
-        self._sent = (wall, core.link.retransmitted)
+        self._sent = wall
         core.ask("get_clock", "clock", self._clocked, wall, times=PATIENCE)
         core.link.flush(wall)
-        if core.link.backlog:  # it has to wait itself
-            self._sent = None
 
     def _clocked(self, message: Message, wall: WallNs) -> None:
         core = self._core
         tick = core.whole(message, "clock", wall)
-        undisturbed = self._sent is not None and self._sent[1] == core.link.retransmitted
-        if self._sent is not None and undisturbed and not core.clock.note(tick, self._sent[0], wall):
+        if not core.clock.note(tick, self._sent, wall):
             self.ask(wall)  # the next one says which of them was wrong
         elif self._left:
             self._left -= 1

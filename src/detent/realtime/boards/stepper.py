@@ -501,6 +501,7 @@ class Stepper:
                 self._doubted = None
             elif self._doubted is None or self._doubted[0] != by:
                 self._doubted, self._proved = (by, at + LOOK_AGAIN), False
+                self._core.look_at_clock(at)  # where it stands, its last step may be to come
             else:
                 core = self._core
                 core.events.append(CountDiffers(core.setup.name, self.name, self._told, self.counted()))
