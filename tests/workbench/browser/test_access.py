@@ -145,6 +145,17 @@ def test_every_page_is_reached_and_left_by_the_keyboard_alone(window: Window) ->
         assert len(set(seen)) > 6, f"{path}: the focus stands still: {seen}"
 
 
+@pytest.mark.parametrize("focus", [".cm-content", "[data-unit=bar]", ".program-files button", "body"])
+def test_control_s_saves_the_program_wherever_the_focus_is(window: Window, focus: str) -> None:
+    window.page.get_by_role("link", name="Program", exact=True).click()
+    window.page.locator(".program[data-checked=loaded]").wait_for()
+    window.page.evaluate("(place) => (document.activeElement.blur(), document.querySelector(place).focus())", focus)
+    window.page.keyboard.press("Control+s")
+    window.page.locator("dialog.program-dialog[open]").wait_for()
+    window.page.keyboard.press("Escape")
+    window.page.locator("dialog.program-dialog:not([open])").wait_for(state="attached")
+
+
 @pytest.mark.parametrize("key", ["F8", "F9", "F10", "F4"])
 def test_the_keys_of_the_debugger_act_wherever_the_focus_is(window: Window, key: str) -> None:
     window.page.get_by_role("link", name="Program", exact=True).click()
