@@ -189,3 +189,26 @@ def test_serve_is_ready_is_alive_and_says_when_it_stops(tmp_path: Path) -> None:
             heard.append(at.recv(4096).decode())
         assert served.wait(60) == 0
     assert heard[0] == "READY=1\nSTATUS=serving x, y"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "error"),
+    [
+        ('EOT = "^gpio10"', 'EOT = "gpio2"', "hardware.slide.inputs.EOT: pin gpio2 of pico is hardware.slide.step"),
+        ('inputs.EOT = "^gpio10"', "", "hardware.slide.inputs: slide has no EOT: wire it"),
+        ('eeprom = "slide.gsc"', 'eeprom = "none.gsc"', "none.gsc"),
+        ('REC = "low"', 'RECC = "low"', "did you mean REC?"),
+    ],
+)
+def test_no_unit_is_made_for_a_cell_that_cannot_be_served(
+    old: str, new: str, error: str, cell: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At power-on nobody would see why."""
+    text = cell.read_text()
+    assert old in text
+    machine = "" if "[switches" not in text else text[text.index("[switches") :]
+    cell.write_text(text.replace(machine, "").replace(old, new))
+    status, out, err = run(capsys, "service", str(cell))
+    assert (status, out) == (2, "")
+    assert error in err
+    assert err.count("\n") == 1

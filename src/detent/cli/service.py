@@ -54,10 +54,12 @@ def service(
     json
         Print name, text and remarks as one line of JSON.
     """
+    from detent.cell.build import build
     from detent.cell.description import Problem
     from detent.cli.endings import asked_wrongly, failed
     from detent.cli.serve import asked_address
     from detent.outputs.files import check_outputs, write_whole
+    from detent.realtime.boards.plan import plan
     from detent.realtime.cell_source import find_cell
 
     try:
@@ -73,6 +75,9 @@ def service(
         if not re.fullmatch(r"[a-z_][a-z0-9_-]*\$?", who):
             raise Problem("", "--user", f"{who!r} is no name of a user")
         check_outputs([output], found.inputs, asked=overwrite)
+        made = build(found.description, found.read, record=False)  # at power-on nobody reads why it cannot be
+        if found.description.hardware:
+            plan(found.description, made.controllers())
     except ValueError as problem:
         asked_wrongly(problem)
     remarks = _remarks(found.description, who)
