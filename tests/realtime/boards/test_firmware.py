@@ -204,7 +204,8 @@ class Host:
         self.until(lambda: not self.axis.moving or self.failed, 120)
         assert not self.failed, self.events
         stepper = self.boards.steppers["slide"]
-        self.until(lambda: stepper.over(self.machine.wall()) or self.failed)
+        stop = self.boards.stops["slide"]
+        self.until(lambda: (stepper.over(self.machine.wall()) and not stop.firing) or self.failed)
         self.until(lambda: not stepper.proving or self.failed)
         assert not self.failed, self.events
 

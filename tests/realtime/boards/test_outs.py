@@ -1,10 +1,12 @@
 """Outputs: a change comes at its tick, is held back while it can still be taken back, and corrected where it cannot."""
 
+import pytest
 from tests.realtime.boards.bench import Bench, bench
 
 from detent.ramps import constant_acceleration
+from detent.realtime.boards.events import ShutDown
 from detent.realtime.boards.setup import OutSetup, Pin
-from detent.ticks import MS, SECOND
+from detent.ticks import MS, SECOND, Ns
 
 
 def changes(made: Bench, pin: str = "gpio6") -> list[tuple[int, bool]]:
@@ -157,3 +159,23 @@ def test_many_changes_wait_for_room_in_the_queue() -> None:
     made.run(1 * SECOND)
     assert made.boards.ready
     assert len(changes(made)) == 60
+
+
+@pytest.mark.parametrize("held", [0, 20 * MS, 200 * MS])
+def test_what_is_late_already_cannot_be_too_late(held: Ns) -> None:
+    """A time a few milliseconds from now, on a wire that takes longer, would shut the board down."""
+    made = bench()
+    out, at = made.boards.outs["MOV"], made.now
+    made.run(80 * MS)
+    port = made.ports[0]
+    send = port.send
+    port.send = lambda data, wall: send(data, wall + held)  # type: ignore[method-assign]
+    out.set(True, at)
+    made.run(50 * MS)
+    out.set(False, at)
+    made.run(400 * MS)
+    out.now(True)
+    made.run(400 * MS)
+    assert made.boards.ready
+    assert not made.of(ShutDown)
+    assert [level for _, level in changes(made)] == [True, False, True]

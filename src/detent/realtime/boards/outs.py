@@ -12,6 +12,7 @@ from detent.ticks import MS, Ns
 HOLD: Ns = 8 * MS
 """A change is given to the board so long before it is due (or two margins): until then it can be taken back."""
 
+PAST = -(1 << 62)  # a tick before everything
 RETRY: WallNs = 1 * MS  # where a board has no room
 ONE_CHANGE = 16  # bytes of its message at most
 
@@ -36,7 +37,7 @@ class DigitalOut:
         self._core = core
         self._pending: deque[_Change] = deque()
         self._given: deque[_Change] = deque(maxlen=256)
-        self._last_tick = -(1 << 62)  # of what was given
+        self._last_tick = PAST  # of what was given
         self._first = setup.initial  # before all that was given
         self._back: bool | None = None  # taken back: the level that it had there
         self._rewound = False
@@ -122,14 +123,18 @@ class DigitalOut:
             at, _, level = self._pending.popleft()
             self._given.append(_Change(at, self._last_tick, level))
         if level is not self.level:
-            if not self._give(soonest, level, soonest, wall):
+            if not self._give(PAST, level, soonest, wall):
                 self._back = level
                 return
             self.corrections += self._rewound
         self._back = None
 
     def _give(self, tick: int, level: bool, soonest: int, wall: WallNs) -> bool:
+        """Whether there was room for it. What is late already has no time: that could be later still, on the wire."""
         core = self._core
+        if tick < soonest and self._idle(wall) and core.link.spare >= ONE_CHANGE:
+            self._at_once(level, wall)
+            return True
         if core.queue.room(core.clock.tick_at(wall) - core.ticks(UNSURE)) <= 0 or core.link.spare < ONE_CHANGE:
             self._again_at = wall + RETRY
             return False
@@ -142,15 +147,23 @@ class DigitalOut:
         return True
 
     def _feed(self, wall: WallNs) -> None:
-        """The level that it has, at once: that has no time, and so cannot be late. Nothing may be queued meanwhile."""
+        """Say the level that it has, which must not wait for long."""
         core = self._core
-        if self._last_tick + core.ticks(UNSURE) >= core.clock.tick_at(wall):
+        if not self._idle(wall):
             self._again_at = core.clock.wall_at(self._last_tick + 2 * core.ticks(UNSURE))
         elif core.link.spare < ONE_CHANGE:
             self._again_at = wall + RETRY
         else:
-            core.command("update_digital_out", oid=self.oid, value=int(self.level is not self.setup.pin.active_low))
-            self._fed_at = wall
+            self._at_once(self.level, wall)
+
+    def _idle(self, wall: WallNs) -> bool:
+        """Whether everything that was queued has been done."""
+        return self._last_tick + self._core.ticks(UNSURE) < self._core.clock.tick_at(wall)
+
+    def _at_once(self, level: bool, wall: WallNs) -> None:
+        """Say a level that has no time, and so cannot be late. Nothing may be queued."""
+        self._core.command("update_digital_out", oid=self.oid, value=int(level is not self.setup.pin.active_low))
+        self.level, self._fed_at = level, wall
 
     def _hungry(self, wall: WallNs) -> bool:
         at = self.deadline()
@@ -181,7 +194,7 @@ class DigitalOut:
         self._pending.clear()
         self._given.clear()
         self._back = None
-        self._last_tick = -(1 << 62)
+        self._last_tick = PAST
         self._fed_at = wall - (self.setup.watchdog or 0)
         self.dead = False
 
