@@ -17,14 +17,12 @@ from urllib.parse import urlsplit
 
 from detent.cell.description import Problem
 from detent.cell.moments import Cut
-from detent.outputs.signals import Signals
 from detent.pins import Level
 from detent.realtime.cell_source import find_cell
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.endpoints.tcp import TcpAddress
 from detent.ticks import SECOND, Ns
 from detent.workbench import exports, joining
-from detent.workbench.beside import beside
 from detent.workbench.messages import (
     Answer,
     Ask,
@@ -576,19 +574,10 @@ class Bench:
         Traces (keys) and times are for csv; without them all axes, from the beginning of the history to its
         end. Raises BenchError for an unknown kind, and where the format cannot hold it.
         """
-        if kind not in exports.KINDS:
-            raise BenchError(f"there is no export {kind!r}; choose from {', '.join(exports.KINDS)}")
         first = self.state.begin if begin is None else max(begin, self.state.begin)
         last = self.state.end if end is None else min(end, self.state.end)
         try:
-            if kind in ("vcd", "sr", "npz"):
-                recording, views, until = self._mirror.recording(), self._mirror.views, self._mirror.until
-                return await beside(lambda: exports.whole(kind, Signals(recording, views, until)))
-            chosen = [trace for trace in self.traces if trace.key in traces or (not traces and not trace.digital)]
-            if not chosen:
-                raise BenchError("there is no such trace to export")
-            data = self._scope.columns([trace.key for trace in chosen], first, last, exports.CSV_ROWS, first)
-            return await beside(exports.table, chosen, data)  # the words of a million numbers take seconds
+            return await exports.made(kind, self._mirror, self._scope, traces, first, last)
         except (ValueError, OSError) as error:
             raise BenchError(str(error)) from error
 

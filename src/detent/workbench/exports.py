@@ -8,10 +8,30 @@ from pathlib import Path
 from typing import Final
 
 from detent.outputs.signals import Signals
-from detent.workbench.scope import ScopeData, Trace
+from detent.ticks import Ns
+from detent.workbench.beside import beside
+from detent.workbench.mirror import Mirror
+from detent.workbench.scope import Scope, ScopeData, Trace
 
 KINDS: Final = ("vcd", "sr", "npz", "csv")
 CSV_ROWS: Final = 20_000  # columns of time, at most
+
+
+async def made(kind: str, mirror: Mirror, scope: Scope, keys: Sequence[str], first: Ns, last: Ns) -> bytes:
+    """A file of a kind of `KINDS`, made beside the loop. `keys` and times are for csv; no keys: all axes.
+
+    ValueError for another kind, an unknown trace, and where the format cannot hold it.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"there is no export {kind!r}; choose from {', '.join(KINDS)}")
+    if kind != "csv":
+        recording, views, until = mirror.recording(), mirror.views, mirror.until
+        return await beside(lambda: whole(kind, Signals(recording, views, until)))
+    chosen = [trace for trace in scope.traces if trace.key in keys or (not keys and not trace.digital)]
+    if not chosen:
+        raise ValueError("there is no such trace to export")
+    data = scope.columns([trace.key for trace in chosen], first, last, CSV_ROWS, first)
+    return await beside(table, chosen, data)  # the words of a million numbers take seconds
 
 
 def whole(kind: str, signals: Signals) -> bytes:

@@ -224,6 +224,13 @@ class Bench:
         """The computer is elsewhere."""
         self.wall += span
 
+    def come_back(self) -> None:
+        """Every board is plugged in again, and recovered."""
+        for port in self.ports.values():
+            port.unplugged = False
+        self.driven.recover()
+        self.run(2 * SECOND)
+
     def press(self, name: str, level: int) -> None:
         """A hand gives an input (UNIT.PIN) a logical level, now."""
         board = self.plan.board_of[name]

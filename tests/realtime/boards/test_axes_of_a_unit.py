@@ -52,7 +52,6 @@ class Session:
         self.rough, self.boards = rough, boards
         self.befallen = False
         self.restarted: set[str] = set()
-        self.unplugged: set[str] = set()
         edge = random.randrange(30, 400)
         self.limits = {"x.LX+": ("x.X", edge, 10**6), "x.LY-": ("x.Y", -(10**6), -edge // 2)}
         lead = random.choice([5, 10, 30, 60])
@@ -86,11 +85,10 @@ class Session:
             case 0:
                 board = random.choice(self.boards)
                 bench.ports[board].unplugged = True
-                self.unplugged.add(board)
                 bench.run(60 * MS)
             case 1:
                 board = random.choice(self.boards)
-                if board not in self.unplugged:
+                if not bench.ports[board].unplugged:
                     bench.ports[board].board.power_cycle()
                     self.restarted.add(board)
                     bench.run(1200 * MS)
@@ -101,15 +99,8 @@ class Session:
                 bench.run(100 * MS)
                 assert [bench.position(axis) for axis in AXES] == stood
             case 3:
-                self.recover()
+                self.bench.come_back()
         self.on = True
-
-    def recover(self) -> None:
-        for board in self.unplugged:
-            self.bench.ports[board].unplugged = False
-        self.unplugged.clear()
-        self.bench.driven.recover()
-        self.bench.run(2 * SECOND)
 
     def end(self) -> None:
         """Everything plugged in and recovered, a reset, and rest."""
@@ -118,7 +109,7 @@ class Session:
             bench.press(name, 1)
         bench.run(50 * MS)
         for _ in range(2 if self.rough else 0):
-            self.recover()
+            self.bench.come_back()
         bench.press("x.RST", 0)
         bench.run(100 * MS)
         bench.press("x.RST", 1)

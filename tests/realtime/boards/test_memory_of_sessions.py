@@ -13,7 +13,7 @@ from tests.realtime.boards.driven_bench import Bench, no_file
 from detent.cell.build import build
 from detent.cell.description import parse
 from detent.realtime.boards.states import Weight
-from detent.ticks import MS, SECOND, US, Ns
+from detent.ticks import MS, US, Ns
 
 CELL = """
 [units.x]
@@ -88,13 +88,8 @@ class Session:
             case 2:
                 bench.driven.stop()
             case _:
-                self.recover()
+                bench.come_back()
         self.on = True
-
-    def recover(self) -> None:
-        self.bench.ports["b"].unplugged = False
-        self.bench.driven.recover()
-        self.bench.run(2 * SECOND)
 
     def ideal(self) -> list[bytes]:
         """What the cell stored to which the same was done, without boards."""
@@ -143,7 +138,7 @@ class Session:
                     self.befall()
             self.on = False
             for _ in range(2 if self.rough else 0):
-                self.recover()
+                bench.come_back()
             for name in ("x.JOG1", "x.JOG2"):
                 bench.press(name, 1)
             bench.send("x", b"\x1b")

@@ -12,7 +12,7 @@ from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench
 
 from detent.realtime.boards.states import AxisState, Standing, Weight
-from detent.ticks import MS, SECOND, US, Ns
+from detent.ticks import MS, US, Ns
 
 UNIT = """
 [units.{unit}]
@@ -41,7 +41,6 @@ class Rough:
     def __init__(self, bench: Bench, random: Random) -> None:
         self.bench, self.random = bench, random
         self.restarted: set[str] = set()
-        self.unplugged: set[str] = set()
 
     def axis(self, unit: str) -> AxisState:
         return next(state for state in self.bench.driven.axes() if state.unit == unit)
@@ -56,14 +55,13 @@ class Rough:
         other = "y" if unit == "x" else "x"
         before = self.axis(other).standing
         self.bench.ports[UNITS[unit]].unplugged = True
-        self.unplugged.add(UNITS[unit])
         self.bench.run(60 * MS)
         assert self.axis(unit).standing is Standing.FAULT
         assert self.axis(other).standing is before, "a board that is gone stops nothing on another"
 
     def restart(self) -> None:
         board = self.random.choice("ab")
-        if board not in self.unplugged:
+        if not self.bench.ports[board].unplugged:
             self.bench.ports[board].board.power_cycle()
             self.restarted.add(board)
             self.bench.run(1200 * MS)  # one that has nothing to do is asked for its clock once a second
@@ -76,13 +74,6 @@ class Rough:
         stood = [self.bench.position(unit) for unit in UNITS]
         self.bench.run(100 * MS)
         assert [self.bench.position(unit) for unit in UNITS] == stood
-
-    def recover(self) -> None:
-        for board in self.unplugged:
-            self.bench.ports[board].unplugged = False
-        self.unplugged.clear()
-        self.bench.driven.recover()
-        self.bench.run(2 * SECOND)
 
     def bounce(self) -> None:
         """A contact that makes up its mind within some milliseconds."""
@@ -118,10 +109,10 @@ def session(seed: int) -> int:
                 rough.say()
                 bench.run(random.choice([2 * MS, 30 * MS, 300 * MS]) + random.randrange(MS))
             on[0] = False
-            random.choice([rough.say, rough.unplug, rough.restart, rough.stop, rough.recover, rough.bounce])()
+            random.choice([rough.say, rough.unplug, rough.restart, rough.stop, rough.bench.come_back, rough.bounce])()
             bench.run(random.choice([0, 5 * MS, 100 * MS]) + 1)
-        rough.recover()
-        rough.recover()
+        rough.bench.come_back()
+        rough.bench.come_back()
         for unit in UNITS:
             bench.type(unit, "K")
         bench.run(300 * MS)

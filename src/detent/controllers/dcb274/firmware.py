@@ -1,8 +1,8 @@
 """One DCB-274 as a device: the contract of `controllers.device`, and who gets each character.
 
 Work is split: `link` makes lines of characters, `desk` has the typed command in hand, `running` the program, `work`
-what both can do, `motion` the axis, `ports` the pins, `contacts` what sets something going. Here they meet, and
-whatever the idle state tests is tested (jog, go: page 27).
+what both can do, `motion` the axis, `ports` the pins, `contacts` what sets something going, `readout` what Z 1 prints.
+Here they meet, and whatever the idle state tests is tested (jog, go: page 27).
 """
 
 from collections import deque
@@ -32,10 +32,11 @@ from detent.controllers.dcb274.memory import SIZE, Memory
 from detent.controllers.dcb274.motion import SETTLING, Motion, News
 from detent.controllers.dcb274.ports import Ports
 from detent.controllers.dcb274.program import POWER_UP
+from detent.controllers.dcb274.readout import Readout
 from detent.controllers.dcb274.running import Running
 from detent.controllers.dcb274.settings import Settings
 from detent.controllers.dcb274.trip import Trip
-from detent.controllers.dcb274.work import Work, position
+from detent.controllers.dcb274.work import Work
 from detent.controllers.device import NamedLines, StageSet, Status, Stop, StoreImage
 from detent.controllers.powered import OneAxis
 from detent.pins import HIGH, LOW, Level, Pin, PulseOutput
@@ -50,7 +51,7 @@ class Dcb274(OneAxis):
     """One DCB-274. Straps that are not named are `pins.DEFAULT_STRAPS`."""
 
     model = MODEL
-    INSTANTS = instants(_readout_at=0)
+    INSTANTS = instants()
     NAMED_LINES = NamedLines(LF, AT_ONCE)
 
     def __init__(
@@ -76,6 +77,7 @@ class Dcb274(OneAxis):
         self._work = Work(self._motion, self._ports, self.memory, self._settings, self._trip, times=execution_times)
         self._running = Running(self._work, self._out, self._say)
         self._desk = Desk(self._work, self._running, self, self._out)
+        self._readout = Readout(self._motion, self._settings)
         self._set_inputs: set[str] = set()  # that something drives: the others follow the PLC jumper
         self._base = 0  # of the program that was loaded
         self._staged: tuple[int, int, tuple[int, int], int] | None = None  # what was last told of the power stage
@@ -94,8 +96,7 @@ class Dcb274(OneAxis):
         self._conflict = False  # GO and SS were both true
         self._stopped = False  # the soft stop input was active when it was looked at last
         self._contacts.reset()
-        self._shown = 0  # the position printed last, for Z 1
-        self._readout_at: Ns = NEVER
+        self._readout.reset()
 
     # -- the contract ------------------------------------------------------------------------------------
 
@@ -363,7 +364,7 @@ class Dcb274(OneAxis):
     def only_its_program(self, now: Ns) -> bool:
         """At rest, with the current that it has at rest, and nothing is typed, printed or read out."""
         over = max(self._motion.rested_at + SETTLING, self._transmitter.busy_until) <= now
-        others = min(self._motion.deadline, self._desk.timer, self._transmitter.deadline, self._readout_at)
+        others = min(self._motion.deadline, self._desk.timer, self._transmitter.deadline, self._readout.deadline)
         return over and others >= NEVER and self._motion.at_rest and self._running.timer < NEVER
 
     @property
@@ -563,7 +564,7 @@ class Dcb274(OneAxis):
             self._running.poll(now)  # an @ that waited for G ends the program that G has begun
             self._desk.poll(now)
         self._test_inputs(now)
-        self._read_out(now)
+        self._readout.look(self._transmitter, now, single=self.mode is Mode.SINGLE)
         registers, origin = self._settings, self._motion.phase_origin
         staged = origin, registers.resolution, registers.current, registers.decay
         if staged != self._staged:
@@ -585,22 +586,6 @@ class Dcb274(OneAxis):
         elif motion.at_rest and (jog := self._contacts.jog):
             motion.jog(jog, ports.active("JOG-S"), now)
 
-    def _read_out(self, now: Ns) -> None:
-        """Z 1: print a changed position when the line is free (page 53)."""
-        self._readout_at = NEVER
-        if not self._settings.readout or self.mode is not Mode.SINGLE:
-            return
-        free = self._transmitter.busy_until
-        if free > now:
-            self._readout_at = free
-            return
-        at = self._motion.position(now)
-        if at != self._shown:
-            self._shown = at
-            self.send(position(at) + "\r", now)
-            free = self._transmitter.busy_until
-        self._readout_at = max(free, self._motion.next_change(now))
-
     def _next(self) -> Ns:
         """The earliest deadline; written out, as nothing is asked more often."""
         at = self._motion.deadline
@@ -610,4 +595,6 @@ class Dcb274(OneAxis):
             at = timer
         if (character := self._transmitter.deadline) < at:
             at = character
-        return self._readout_at if self._readout_at < at else at
+        if (readout := self._readout.deadline) < at:
+            at = readout
+        return at

@@ -9,7 +9,7 @@ before the line is complete: the line is taken back and entered again, so nobody
 from typing import Final
 
 from detent.hosts.errors import NoAnswer, Refused, Spoken
-from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps
+from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps, length
 
 BS, LF, CR, SPACE, ESC = b"\x08", b"\n", b"\r", b" ", b"\x1b"
 CTRL_C, CTRL_N, CTRL_P = b"\x03", b"\x0e", b"\x10"
@@ -51,6 +51,16 @@ class Handshake(Driver):
         """
         raise NotImplementedError
         yield
+
+    def spell(self, text: bytes) -> Steps[tuple[bytes, bool]]:
+        """Send characters, each behind the echo of the one before; what was echoed, and whether that was all of it."""
+        echo = b""
+        for character in text:
+            answer = yield Ask(bytes((character,)), length(1), self.patience)
+            echo += answer.data
+            if answer.data != bytes((character,)):
+                return echo, False
+        return echo, True
 
     def interrupt(self, character: bytes, *, known: bool) -> Steps[None]:
         """Send ``@`` or ``|``, where lines have names: also a unit that runs a program takes it (page 28).

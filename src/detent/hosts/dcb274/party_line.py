@@ -55,13 +55,8 @@ class PartyLine(Handshake):
         echo = b""
         for _ in range(1 if self.running else tries):
             yield Clear()
-            echo = b""
-            for character in entered:
-                answer = yield Ask(bytes((character,)), length(1), self.patience)
-                echo += answer.data
-                if answer.data != bytes((character,)):
-                    break
-            else:
+            echo, whole = yield from self.spell(entered)
+            if whole:
                 return
             # An LF would have half a line carried out, ESC would stop every axis. A line that is too long and no
             # command besides is refused by whoever listens.

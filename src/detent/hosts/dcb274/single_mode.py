@@ -102,13 +102,8 @@ class SingleMode(Handshake):
         echo = b""
         for _ in range(1 if self.running else tries):
             yield Clear()
-            echo = b""
-            for character in text.encode("latin-1"):
-                answer = yield Ask(bytes((character,)), length(1), self.patience)
-                echo += answer.data
-                if answer.data != bytes((character,)):
-                    break
-            else:
+            echo, whole = yield from self.spell(text.encode("latin-1"))
+            if whole:
                 return
             if not self.running:
                 yield from self._erase()
