@@ -4,6 +4,7 @@ Processor time, not time of the wall: what else runs here does not count. The bo
 its own work is not in the figures.
 """
 
+import gc
 from collections.abc import Callable
 from fractions import Fraction
 from statistics import median
@@ -267,6 +268,7 @@ inputs = { EOT = "^gpio10", HOME = "^gpio11" }
 """
     taken: list[float] = []
     copies: list[float] = []
+    gc.freeze()  # as `serve` does: what other benchmarks left is no part of it
     for end in range(20, 40):
         machine = Machine({"x": MachineAxis("gpio2", "gpio3")}, [
             MachineSwitch("x", "gpio10", end, 10_000, False), MachineSwitch("x", "gpio11", -10_000, end - 10, False),
@@ -296,9 +298,10 @@ inputs = { EOT = "^gpio10", HOME = "^gpio11" }
                 copies.append(process_time() - begin)
     base, name = median(copies) / MS * SECOND, "a copy of the cell"
     worst = max(taken) / MS * SECOND
+    gc.unfreeze()
     return [
         Row("a stop takes the cell back, half of them", median(taken) / MS * SECOND, "ms", name, base, 6),
-        Row("a stop takes the cell back, the longest", worst, "ms", name, base, None),
+        Row("a stop takes the cell back, the longest", worst, "ms", name, base, 6),
     ]
 
 
