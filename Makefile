@@ -46,9 +46,10 @@ bench: $(STAMP)
 fuzz chaos soak: $(STAMP)
 	$(PYTHON) -m tests.proofs $@
 
-# What a cell needs to run, in the versions of the lock, for every other Python that is installed.
+# What a cell needs to run, in the versions of the lock, for every other Python that is installed. Those of pyenv are
+# named to uv: the shims that pyenv has on the path refuse a version that is not chosen.
 pythons: $(STAMP)
-	@for version in 3.12 3.13; do \
+	@PATH="$$(printf '%s:' "$${PYENV_ROOT:-$$HOME/.pyenv}"/versions/*/bin)$$PATH"; for version in 3.12 3.13; do \
 	    $(UV) python find --quiet $$version > /dev/null 2>&1 || { echo "no Python $$version here"; continue; }; \
 	    $(UV) venv --quiet --allow-existing --python $$version .venv/python$$version \
 	        && $(UV) pip install --quiet --python .venv/python$$version --constraint requirements.lock pydantic numpy \

@@ -20,6 +20,7 @@ from detent.cell.outside import no_store
 from detent.outputs.steps import Error, Runs, Scale
 from detent.pulses import Accelerating, Train
 from detent.ramps import constant_acceleration, tick_accumulator
+from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
@@ -28,7 +29,6 @@ from detent.realtime.boards.frames import Reader, block
 from detent.realtime.boards.link import Link
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.setup import BoardSetup, Pin, StepperSetup
-from detent.realtime.boards.several import Boards
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace, WallNs
 from detent.ticks import MS, SECOND, US, to_fixed

@@ -5,12 +5,12 @@ from typing import Any, TypeVar
 
 from detent.axis import Axis, MotionCut, MotionEnded, MotionStarted
 from detent.pulses import Train
+from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.events import Event, Ready, Stopped
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.setup import BoardSetup, InputSetup, OutSetup, Pin, StepperSetup
-from detent.realtime.boards.several import Boards
 from detent.ticks import MS, SECOND, Ns, to_fixed
 
 E = TypeVar("E")

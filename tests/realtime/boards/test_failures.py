@@ -11,6 +11,7 @@ from tests.realtime.boards.bench import ENABLE, EOT, MOV, SLIDE, Bench, bench, s
 
 from detent.ramps import constant_acceleration
 from detent.realtime.boards.board import State
+from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.core import Core
 from detent.realtime.boards.dictionary import Message
 from detent.realtime.boards.events import CountDiffers, Lost, Ready, Recovered, Refusal, ShutDown, Stopped
@@ -20,7 +21,6 @@ from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.port import PortError
 from detent.realtime.boards.ports import Look, open_port
 from detent.realtime.boards.setup import BoardSetup, DriverSetup, InputSetup, OutSetup, Pin, SetupProblem, StepperSetup
-from detent.realtime.boards.several import Boards
 from detent.ticks import MS, SECOND, US
 
 ENDLESS = constant_acceleration.move(1000, 1000, 1, None).train

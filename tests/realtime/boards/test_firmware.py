@@ -22,6 +22,7 @@ import pytest
 from detent.axis import Axis, MotionStarted
 from detent.pulses import Train
 from detent.ramps import constant_acceleration
+from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.events import (
     CountDiffers,
     InputChanged,
@@ -34,7 +35,6 @@ from detent.realtime.boards.events import (
 )
 from detent.realtime.boards.ports import Look, open_port
 from detent.realtime.boards.setup import BoardSetup, InputSetup, OutSetup, Pin, StepperSetup
-from detent.realtime.boards.several import Boards
 from detent.ticks import MS, SECOND, US, Ns, to_fixed
 
 TERMINAL = os.environ.get("DETENT_FIRMWARE_PTY", "")

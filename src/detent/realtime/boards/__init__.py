@@ -13,9 +13,9 @@ the wall clock and give bytes, so the same code runs against the fake board in v
 | `setup` | what hangs on which pin |
 | `board` | one board: configuration, move queue, shutdown, recovery |
 | `stepper` | one axis: motion entries in, runs of steps out; `count` is what the firmware counts of them |
-| `outs`, `inputs`, `stops` | digital outputs with a watchdog, inputs, stops in the firmware |
+| `outputs`, `inputs`, `stops` | digital outputs with a watchdog, inputs, stops in the firmware |
 | `drivers`, `registers` | TMC2208/2209 by UART, TMC2130/5160 by SPI |
-| `several` | all boards of a cell, one of them master of time |
+| `boards` | all boards of a cell, one of them master of time |
 | `ports` | a serial device, or the fake board |
 | `events` | what comes back |
 | `plan`, `opening`, `drive` | a cell file's tables to setups; boards opened and ready; what a service needs |

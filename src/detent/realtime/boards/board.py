@@ -1,7 +1,7 @@
 """One board: from the first byte to steps, and through shutdown and loss.
 
 A board is told what it received and what the wall clock says, and gives bytes to send. It begins to talk with `start`;
-`Ready` or `Refusal` is the first event. See `several.Boards` for what a cell uses.
+`Ready` or `Refusal` is the first event. See `boards.Boards` for what a cell uses.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -15,7 +15,7 @@ from detent.realtime.boards.dictionary import BARE, Dictionary, Message
 from detent.realtime.boards.equipment import Equipment
 from detent.realtime.boards.events import BY_HAND, Lost, Ready, Recovered, Refusal, ShutDown
 from detent.realtime.boards.frames import ROOM, FrameError
-from detent.realtime.boards.outs import DigitalOut
+from detent.realtime.boards.outputs import DigitalOut
 from detent.realtime.boards.probes import Probes
 from detent.realtime.boards.setup import BoardSetup
 from detent.realtime.boards.vocabulary import owner, unsuited

@@ -101,8 +101,8 @@ class Core:
         """The first tick for which something may still be sent at `wall`."""
         return self.clock.tick_at(wall) + self.ticks(self.setup.margin)
 
-    def unhurried(self, wall: WallNs) -> int:
-        """A tick for what has no time of its own: a lead from now, so that a host which is kept away is not late."""
+    def after_lead(self, wall: WallNs) -> int:
+        """The tick a lead from now, for what has no time of its own: a host that is kept away is not late with it."""
         return self.clock.tick_at(wall) + self.ticks(self.setup.lead)
 
     def whole(self, message: Message, field: str, wall: WallNs) -> int:

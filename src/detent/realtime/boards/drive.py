@@ -12,13 +12,13 @@ from detent.cell.description import Description
 from detent.outputs.steps import Error, Runs, Scale
 from detent.pins import Level
 from detent.pulses import Train, Uniform
+from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.opening import Sleep, boards_of, make_ready, set_drivers, turn
 from detent.realtime.boards.plan import Plan, plan
 from detent.realtime.boards.port import Port
 from detent.realtime.boards.ports import open_port
 from detent.realtime.boards.replies import HeldStores
-from detent.realtime.boards.several import Boards
 from detent.realtime.boards.stages import stages
 from detent.realtime.boards.states import News
 from detent.realtime.boards.stepper import LONGEST

@@ -10,7 +10,7 @@ from detent.realtime.boards.dictionary import Value
 from detent.realtime.boards.drivers import Driver, Wire
 from detent.realtime.boards.inputs import Inputs
 from detent.realtime.boards.lag import Lag, settle
-from detent.realtime.boards.outs import DigitalOut
+from detent.realtime.boards.outputs import DigitalOut
 from detent.realtime.boards.setup import DriverSetup, InputSetup, SetupProblem
 from detent.realtime.boards.stepper import Stepper
 from detent.realtime.boards.stops import Stop

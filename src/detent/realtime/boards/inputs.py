@@ -44,7 +44,7 @@ class Buttons:
         core = self._core
         self._state = sum(1 << i for i, level in enumerate(raw) if level)
         self._acknowledged = 0
-        core.command("buttons_query", oid=self.oid, clock=core.unhurried(wall) & MASK, rest_ticks=core.ticks(POLL),
+        core.command("buttons_query", oid=self.oid, clock=core.after_lead(wall) & MASK, rest_ticks=core.ticks(POLL),
                      retransmit_count=POLLS_TO_REPEAT, invert=self._state)  # fmt: skip
 
     def reported(self, message: Message, wall: WallNs) -> None:

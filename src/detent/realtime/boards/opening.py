@@ -9,6 +9,7 @@ from detent.cell.description import Problem
 from detent.cell.real_pins import device_of
 from detent.controllers.device import Stage
 from detent.pins import Level
+from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.events import DriverFault, DriverSet, Lost, Ready, Refusal
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import MachineAxis, MachineSwitch
@@ -17,7 +18,6 @@ from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.port import Port
 from detent.realtime.boards.ports import FAKE
 from detent.realtime.boards.setup import BoardSetup, SetupProblem
-from detent.realtime.boards.several import Boards
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, SECOND, Ns
 

@@ -16,6 +16,7 @@ from detent.controllers.device import DriveSet, Powered, Stage, StageSet
 from detent.pins import Level, PinSet
 from detent.realtime.boards.axis_ledger import AxisLedger
 from detent.realtime.boards.board import State
+from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.channels import Channel
 from detent.realtime.boards.clock import Clock
 from detent.realtime.boards.guard import Guard
@@ -23,7 +24,6 @@ from detent.realtime.boards.past import Past
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.replies import HeldLine, HeldStores
 from detent.realtime.boards.setup import SetupProblem
-from detent.realtime.boards.several import Boards
 from detent.realtime.boards.states import News, Standing, Weight
 from detent.realtime.pace import Pace, WallNs
 from detent.ticks import MS, NEVER, Ns

@@ -167,7 +167,7 @@ class Stop:
             return
         core = self._core
         self._axis.set_clock(wall)
-        report = core.unhurried(wall)
+        report = core.after_lead(wall)
         core.comes(report)
         core.command("trsync_start", oid=self.oid, report_clock=report & MASK, report_ticks=core.ticks(REPORT),
                      expire_reason=DRY)  # fmt: skip

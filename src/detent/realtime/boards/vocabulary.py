@@ -74,7 +74,7 @@ OF_SPI: Words = {
 EVERYTHING: Words = {**ALWAYS, **OF_STEPPERS, **OF_INPUTS, **OF_OUTS, **OF_UARTS, **OF_SPI}
 
 
-def wanted(setup: BoardSetup) -> Words:
+def required(setup: BoardSetup) -> Words:
     """What the firmware of a board has to know."""
     found = dict(ALWAYS)
     for present, words in (
@@ -89,7 +89,7 @@ def wanted(setup: BoardSetup) -> Words:
 
 def unsuited(setup: BoardSetup, found: Dictionary) -> tuple[str, str, str] | None:
     """Why a board that said `found` of itself cannot be what `setup` wants: item, key, and what to do."""
-    missing = found.missing(wanted(setup))
+    missing = found.missing(required(setup))
     if missing or not found.frequency:
         return "", "", (f"its firmware ({found.version or 'without a version'}) has no {', '.join(missing)}; flash it "
                         "with a current one")  # fmt: skip

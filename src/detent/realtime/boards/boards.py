@@ -14,7 +14,7 @@ from detent.realtime.boards.clock import Clock
 from detent.realtime.boards.drivers import Driver
 from detent.realtime.boards.events import Event
 from detent.realtime.boards.lag import Lag, settle
-from detent.realtime.boards.outs import DigitalOut
+from detent.realtime.boards.outputs import DigitalOut
 from detent.realtime.boards.port import Port, PortLost
 from detent.realtime.boards.setup import BoardSetup, SetupProblem
 from detent.realtime.boards.stepper import Stepper
