@@ -2,10 +2,11 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
@@ -109,10 +110,19 @@ if __name__ == "__main__":
 
 
 def test_workers_do_not_hear_ctrl_c(tmp_path: Path) -> None:
-    """A terminal sends it to all processes: who has started them decides what to do, and ends them."""
+    """A terminal sends it to all processes: who has started them decides what to do, and ends them.
+
+    Nothing else is said either, also where the port is taken that a scheduler has by default.
+    """
     script = tmp_path / "pressed.py"
     script.write_text(PRESSED)
-    done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=240, start_new_session=True)
+    with socket.socket() as taken:
+        with suppress(OSError):  # somebody else has it: as good
+            taken.bind(("127.0.0.1", 8787))
+            taken.listen()
+        done = subprocess.run(
+            [sys.executable, script], capture_output=True, text=True, timeout=240, start_new_session=True
+        )
     assert done.returncode == 0, done.stderr
     word, *workers = done.stdout.split()
     assert word == "whole"

@@ -76,6 +76,8 @@ class Workers:
                     self._cluster = local(
                         n_workers=count or os.cpu_count() or 1, threads_per_worker=1, processes=True,
                         dashboard_address=None, host="127.0.0.1", env=ONE_THREAD, silence_logs=logging.CRITICAL,
+                        # without a port of its own it takes 8787, and warns where that is taken: by another tune
+                        scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
                     )  # fmt: skip
             self._client = make(self._cluster or scheduler, timeout=min(patience, ANSWERS), set_as_default=False)
             self._client.wait_for_workers(1, timeout=patience)

@@ -28,9 +28,12 @@ from detent.ticks import MS, SECOND, US, Ns
 class Wire(FakePort):
     """A fake board whose host may be kept away while it writes: before it, behind it, or in the middle of a block."""
 
-    def __init__(self, board: FakeBoard, clock: Callable[[], Ns], **given: Any) -> None:
+    def __init__(
+        self, board: FakeBoard, clock: Callable[[], Ns], present: Callable[[], Ns], **given: Any
+    ) -> None:  # fmt: skip
+        """`clock` is looked at within a write, which may take time; `present` is what it said last."""
         super().__init__(board, **given)
-        self._clock = clock
+        self._clock, self._present = clock, present
         self.spare_exposed = False  # nothing is held up that has a time and no step before it
         self._until: dict[Value, int] = {}
         self.hold: Callable[[], Ns] = lambda: 0  # for how long the wire stands, while its host goes on
@@ -56,6 +59,7 @@ class Wire(FakePort):
         return found
 
     def send(self, data: bytes, wall: Ns) -> None:
+        wall = max(wall, self._present())  # nothing is written before the clock was looked at last
         exposed = self._exposed(data)
         held = 0 if exposed else self.hold()  # what follows cannot pass it
         self._free = max(self._free, wall + held if held else 0)
@@ -129,7 +133,7 @@ class Bench:
             self.machines[name] = machine_of(described, self.plan, name, switches or {})
             fake = FakeBoard(self.machines[name], **{"moves": 400, **(board or {})})
             fake.kept_log = False
-            self.ports[name] = Wire(fake, lambda: self.look(True), **(port or {}))
+            self.ports[name] = Wire(fake, lambda: self.look(True), lambda: self.wall, **(port or {}))
             self.ports[name].spare_exposed = spare_exposed
             return self.ports[name]
 
@@ -194,13 +198,16 @@ class Bench:
             self.loop.step()
 
     def rest(self, most: Ns = 60 * SECOND) -> None:
-        """Until nothing moves, on the pins too."""
+        """Until nothing moves, on the pins too, and no stop has come that sets a motion going once more."""
         end = self.wall + most
-        while self.wall < end and any(state.moving for state in self.driven.axes()):
-            self.run(20 * MS)
-        self.run(self.plan.lead + self.driven.lag + 150 * MS)
-        while self.wall < end and any(stepper.proving for stepper in self.boards.steppers.values()):
-            self.run(20 * MS)
+        while True:
+            while self.wall < end and any(state.moving for state in self.driven.axes()):
+                self.run(20 * MS)
+            self.run(self.plan.lead + self.driven.lag + 150 * MS)
+            while self.wall < end and any(stepper.proving for stepper in self.boards.steppers.values()):
+                self.run(20 * MS)
+            if self.wall >= end or not any(state.moving for state in self.driven.axes()):
+                return
 
     def type(self, unit: str, text: str) -> None:
         """The host of a unit sends a line, now: when the cell is at its present."""

@@ -60,7 +60,9 @@ class Bench:
         self.fake = FakeBoard(self.machine, moves=400)
         self.fake.chips = Chips() if chips else {}
         self.wall = Wall() if away is None else Busy(away)
-        self.port: FakePort = Wire(self.fake, lambda: self.wall.now if away is None else self.wall.look(True))
+        self.port: FakePort = Wire(
+            self.fake, lambda: self.wall.now if away is None else self.wall.look(True), lambda: self.wall.now
+        )
         described = parse(text, "cell.toml")
         real = RealPins(lambda news: None, lambda _: self.port, self.wall, self.wall.sleep)
         self.check = Check(Opened(described, no_file, real), described)
@@ -241,7 +243,7 @@ def test_whoever_leaves_in_the_middle_leaves_nothing_moving() -> None:
 def test_an_unplugged_board_is_said_in_a_line() -> None:
     bench = Bench()
     bench.port.unplugged = True
-    with pytest.raises(Trouble, match="board b: "):
+    with pytest.raises(Trouble, match="board b is gone: "):
         bench.settle()
 
 

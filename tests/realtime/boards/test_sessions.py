@@ -169,6 +169,105 @@ def test_sessions_that_lost_something_once(seed: int) -> None:
     session("bs0610", seed)
 
 
+def held_at_once(seed: int) -> None:
+    """A motion that ENABLE holds before its first step, while the computer is elsewhere; then another."""
+    random = Random(seed)
+    lead = random.choice([10, 30, 60])
+    with Bench(GS + BOARD.format(lead=lead), jitter=lambda: random.randrange(400 * US)) as bench:
+        bench.run(400 * MS)
+        bench.type("x", "A1")
+        bench.run(30 * MS)
+        bench.press("x.ENABLE", 0)
+        bench.run(5 * MS)
+        bench.type("x", random.choice(["g-", "+5", "-1"]))
+        bench.run(random.randrange(lead * MS))
+        bench.stall(random.randrange(5 * MS, 150 * MS))
+        bench.run(random.randrange(60 * MS))
+        bench.press("x.ENABLE", 1)
+        bench.run(random.randrange(60 * MS))
+        bench.type("x", "-7")
+        bench.run(300 * MS)
+        for end in KINDS["gs-c200s"].ends:
+            bench.type("x", end)
+            bench.run(50 * MS)
+        bench.rest(5 * SECOND)
+        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        [state] = bench.driven.axes()
+        assert state.shaft == bench.position("x") != 0
+
+
+def test_what_was_held_before_its_first_step_moves_when_it_may() -> None:
+    for seed in seeds(16):
+        held_at_once(seed)
+
+
+@pytest.mark.slow
+def test_what_was_held_before_its_first_step_moves_when_it_may_in_many_sessions() -> None:
+    for seed in range(100, 500):
+        held_at_once(seed)
+
+
+def tapped(seed: int) -> None:
+    """A reset, or slew keys, for some milliseconds, at any time around the first steps of motions; then rest."""
+    random = Random(seed)
+    lead = random.choice([10, 30, 60])
+    with Bench(KINDS["bs0610"].text + BOARD.format(lead=lead), jitter=lambda: random.randrange(400 * US)) as bench:
+        bench.run(400 * MS)
+        if random.random() < 0.4:  # with a lag
+            bench.send("x", b"X+S")
+            bench.run(100 * MS)
+            bench.stall(random.randrange(120 * MS))
+            bench.run(100 * MS)
+        if random.random() < 0.8:
+            bench.send("x", random.choice([b"Y-S", b"B+S", b"X300G"]))
+        bench.run(random.choice([random.randrange(lead * MS // 2), random.randrange(200 * MS)]))
+        for _ in range(random.choice([0, 0, 1, 2])):
+            bench.press("x.X+", 0)
+            bench.run(random.randrange(3 * MS, 90 * MS))
+            bench.press("x.X+", 1)
+            bench.run(random.randrange(3 * MS, 90 * MS))
+        bench.press("x.RST", 0)
+        bench.run(random.randrange(3 * MS, random.choice([lead // 3 + 3, 60]) * MS))
+        bench.press("x.RST", 1)
+        bench.run(800 * MS)
+        bench.rest(5 * SECOND)
+        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert not any(state.moving for state in bench.driven.axes()), "a reset was lost"
+        assert [state.shaft for state in bench.driven.axes()] == [bench.position("x.X"), bench.position("x.Y")]
+        assert bench.driven.escaped == 0
+        bench.check_inputs()
+
+
+@pytest.mark.parametrize("ahead", [2, 15, 25])
+def test_a_reset_that_is_over_before_the_first_step_stops_the_motion(ahead: int) -> None:
+    """A stop watches for the pulses of its motion, which leave a lead later: a reset may come and go meanwhile."""
+    with Bench(KINDS["bs0610"].text + BOARD.format(lead=60)) as bench:
+        bench.run(400 * MS)
+        bench.send("x", b"B+S")
+        bench.run(ahead * MS)
+        bench.press("x.RST", 0)
+        bench.run(12 * MS)
+        bench.press("x.RST", 1)
+        bench.run(500 * MS)
+        places = [state.shaft for state in bench.driven.axes()]
+        bench.run(500 * MS)
+        assert [state.shaft for state in bench.driven.axes()] == places
+        assert [bench.position("x.X"), bench.position("x.Y")] == places
+        assert bench.said("x").count("GenStepper") == 2, "at power-on, and behind the reset"
+        assert bench.news == []
+
+
+def test_no_tap_is_lost_before_a_stop_comes_into_force() -> None:
+    for seed in seeds(24):
+        tapped(seed)
+
+
+@pytest.mark.slow
+def test_no_tap_is_lost_in_many_sessions() -> None:
+    for seed in range(100, 600):
+        tapped(seed)
+
+
 @pytest.mark.parametrize("late", [0, 60])
 def test_an_input_that_stops_two_axes_stops_both_and_each_count_is_the_boards(late: int) -> None:
     """A reset in mid-move of both motors: two triggers fire, and the cell is taken back for the first of them."""

@@ -149,7 +149,7 @@ def held_up(seed: int) -> tuple[int, int]:
 @pytest.mark.slow
 def test_a_wire_that_stands_is_a_slip_in_many_sessions() -> None:
     counts = [held_up(seed) for seed in range(100, 400)]
-    assert sum(slips for slips, _ in counts) > 200
+    assert sum(slips for slips, _ in counts) > 80
 
 
 def test_a_wire_that_stands_is_a_slip() -> None:

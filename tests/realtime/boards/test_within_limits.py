@@ -151,7 +151,7 @@ def test_a_home_that_is_left_at_the_pins_when_it_is_looked_for_is_looked_for_ane
         bench.rest()
         state = bench.driven.axes()[0]
         assert state.standing is Standing.DRIVEN, state.why
-        assert state.stops == 2  # home that is left already; and the limit on the way that it looks then
+        assert state.stops == 2, "home that is left already; and the limit on the way that it looks then"
         assert state.shaft == bench.position("x") == 300
         bench.check_inputs()
 

@@ -111,8 +111,10 @@ class Check:
                     self._changes[event.input] += 1
             elif isinstance(event, CountDiffers):
                 self._heard.append(event)
-            elif isinstance(event, (ShutDown, Lost)):
-                raise Trouble(f"board {event.board}: {event.reason}")
+            elif isinstance(event, ShutDown):
+                raise Trouble(f"board {event.board} has shut down: {event.reason}")
+            elif isinstance(event, Lost):
+                raise Trouble(f"board {event.board} is gone: {event.reason}")
             elif isinstance(event, DriverFault):
                 raise Trouble(f"{event.driver}: {event.reason}")
 

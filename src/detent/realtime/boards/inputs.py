@@ -1,6 +1,8 @@
 """Inputs: up to eight pins in a group that the firmware polls, and reports when two polls agree.
 
-What a stop is armed for is told by the stop, exactly; its report is kept back until nothing is armed for it any more.
+What a stop watches for is told by the stop, exactly: its report is kept back until nothing is armed for it any more. A
+stop comes into force with the pulses that it guards, a lead after the cell began them. An input that comes and goes in
+between is told as any other.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -125,10 +127,12 @@ class Inputs:
                 self._tell(name, level, wall)
 
     def _changed(self, name: str, level: bool, wall: WallNs) -> None:
-        if any(stop.armed.get(name) is level for stop in self._stops.values()):
+        kept = self._kept_back.pop(name, None)
+        if any(stop.watches(name, level, wall) for stop in self._stops.values()):
             self._kept_back[name] = level
             return
-        self._kept_back.pop(name, None)
+        if kept is not None:
+            self._tell(name, kept, wall)  # it came and went, and has stopped nothing
         self._tell(name, level, wall)
 
     def _tell(self, name: str, level: bool, wall: WallNs) -> None:

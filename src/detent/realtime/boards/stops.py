@@ -50,6 +50,7 @@ class Stop:
         self._inputs = {name: _Watched(*found, n) for n, (name, found) in enumerate(inputs.items(), 1)}
         self._armed: dict[str, bool] = {}
         self._levels: dict[str, bool] = {}  # for which each was armed last
+        self._force: dict[str, int] = {}  # the tick at which what was armed last comes into force
         self._changes: list[tuple[dict[str, bool], Ns]] = []  # wanted, and not sent yet
         self.clear()
 
@@ -65,6 +66,7 @@ class Stop:
         # what that was, with the messages that were said then: it fires at one of these
         self._before: deque[tuple[int, int]] = deque()
         self._again = False  # that is to be put off before anything else happens
+        self._quieted = 0  # messages that were said when it was told to be quiet: until then it may still have fired
         self._asked = False  # it was told to say where it stands, as steps come too late
         self._firing: Stopped | None = None
 
@@ -85,6 +87,10 @@ class Stop:
     def pending(self) -> bool:
         """Whether something was armed or disarmed that is not sent yet."""
         return bool(self._changes)
+
+    def watches(self, name: str, level: bool, wall: WallNs) -> bool:
+        """Whether the stepper stops at once if an input takes a level at `wall`: it is armed, and in force by then."""
+        return self._armed.get(name) is level and self._force[name] <= self._core.clock.tick_at(wall)
 
     @property
     def alive(self) -> bool:
@@ -174,7 +180,8 @@ class Stop:
         for oid in self._axis.oids:
             core.command("stepper_stop_on_trigger", oid=oid, trsync_oid=self.oid)
         self._alive, self._until, self._begun = True, None, core.link.said
-        self._before.clear()
+        if core.link.acknowledged >= self._quieted:
+            self._before.clear()
 
     def _on(self, watched: _Watched, level: bool, at: Ns, wall: WallNs) -> None:
         core, setup = self._core, watched.setup
@@ -185,6 +192,7 @@ class Stop:
         wanted = self._axis.tick(at) - verdict
         before = self._axis.over_by(at)  # a pulse of the very instant at which this motion began is none of its own
         clock = max(wanted, core.soonest(wall), wanted if before is None else before + 1)
+        self._force[setup.name] = clock
         core.comes(clock)
         core.command(
             "endstop_home", oid=watched.oid, clock=clock & MASK, sample_ticks=sample, sample_count=setup.samples,
@@ -268,15 +276,18 @@ class Stop:
         """No more reports."""
         self._core.command("trsync_start", oid=self.oid, report_clock=0, report_ticks=0, expire_reason=0)
         self._alive, self._until, self._since = False, None, None
+        self._quieted = 0
 
     # -- what the firmware says
 
     def reported(self, message: Message, wall: WallNs) -> None:
         """A trsync_state came."""
-        known = self._core.known
-        if not self._alive or known < self._begun:
+        known, fires = self._core.known, not message.number("can_trigger")
+        if fires and known < self._quieted:  # it did, before it heard that it shall be quiet
+            self._alive = True
+        elif not self._alive or known < self._begun:
             return
-        if message.number("can_trigger"):
+        if not fires:
             while len(self._before) > 1 and self._before[1][1] <= known:
                 self._before.popleft()
             # nothing is under way that could be late, or could stop it
@@ -286,10 +297,23 @@ class Stop:
                 and self._axis.resting
                 and known >= max(self._disarmed, self._axis.said)
             ):
-                self._quiet()
+                self._end(known, wall)
             return
         if self._firing is None:
             self._fired(message.number("trigger_reason"), wall)
+
+    def _end(self, known: int, wall: WallNs) -> None:
+        """It is not needed any more: quiet, as soon as it cannot fire on the way there.
+
+        A host that was kept away hears this report and behind it that it fired since, as it was put off no further.
+        """
+        core = self._core
+        far = core.clock.tick_at(wall) + core.ticks(FAR)
+        if self._until is not None and self._until < far - core.ticks(FAR // 4 * 3):
+            self._put_off(far, wall)
+        elif self._until is None or known >= self._before[-1][1]:
+            self._quiet()
+            self._quieted = core.link.said
 
     def _fired(self, reason: int, wall: WallNs) -> None:
         core = self._core
