@@ -17,6 +17,7 @@ from caproto import (
     ChannelDouble,
     ChannelEnum,
     ChannelInteger,
+    ChannelNumeric,
     ChannelType,
     Forbidden,
     SkipWrite,
@@ -28,6 +29,7 @@ from detent.bridges.epics.fields import Alarm, Settings, Value
 from detent.bridges.epics.motor import Motor, PutFailed
 from detent.bridges.epics.record import MotorRecord
 from detent.bridges.epics.server import Context, quietly
+from detent.bridges.epics.values import check_number
 
 _LIMITS = {
     "VAL": ("LLM", "HLM"), "RBV": ("LLM", "HLM"), "DVAL": ("DLLM", "DHLM"), "DRBV": ("DLLM", "DHLM"),
@@ -64,7 +66,7 @@ class ServedMotor:
             _let_all_types_be_read(channel)
             kept = self.record.takes(field) or field in self.record.fields
             channel.verify_value = self._put(field, channel) if kept else self._keep(field, channel)
-            channel.auth_write = self._answered(field, channel.auth_write)
+            channel.auth_write = self._answered(field, channel)
 
     async def begin(self) -> None:
         """Ask the motor where it is and show everything. Raises DriverError, ValueError."""
@@ -125,14 +127,17 @@ class ServedMotor:
         _failed.set(True)
         self._report(f"{self.name}.{field}: {why}")
 
-    def _answered(self, field: str, write: Callable[..., Awaitable[Any]]) -> Callable[..., Awaitable[Any]]:
+    def _answered(self, field: str, channel: Any) -> Callable[..., Awaitable[Any]]:
         """A channel's `auth_write` that returns the status for the client that waits, whatever the client has put."""
+        write, numeric = channel.auth_write, isinstance(channel, ChannelNumeric)
 
-        async def put(*given: Any, **named: Any) -> Any:
+        async def put(host: Any, user: Any, data: Any, data_type: Any, *given: Any, **named: Any) -> Any:
             _failed.set(False)
             try:
+                if numeric and data_type == ChannelType.STRING:
+                    check_number(data)
                 with numpy.errstate(all="ignore"):
-                    status = await write(*given, **named)
+                    status = await write(host, user, data, data_type, *given, **named)
             except Forbidden:
                 self._fail(field, "is the record's own: it is read, not put")
                 return CAStatus.ECA_NOWTACCESS

@@ -2,7 +2,7 @@
 
 caproto hands a monitor from queue to queue, and answers a put past them. Here the answer to a put stands in the same
 line as the monitors of its circuit, behind those that came before it: a client that has waited for its put has seen
-all that the put did.
+all that the put did. What clients hold has a bound, and each gets its turn: none keeps another's STOP waiting.
 """
 
 import asyncio
@@ -15,12 +15,21 @@ from typing import Any, Final
 from weakref import ref
 
 import caproto
+from caproto import CAStatus
 from caproto.asyncio import server
 from caproto.server.common import DisconnectedCircuit
+
+from detent.bridges.epics.room import CLIENTS, Room
+from detent.bridges.epics.values import Refused, not_whole
 
 OFTEN: Final = 10  # lines about what clients sent wrongly, and then
 PAUSE: Final = 60.0  # one line in so many seconds, with the number of those that were left out
 LONGEST: Final = 300  # characters of a line
+
+PUTS: Final = 256  # of one client under way; as many again of those that stop
+MESSAGE: Final = 16_384  # bytes of one message: what EPICS allows unless it is told otherwise
+DATAGRAM: Final = 4_096  # bytes: clients search with 1 472 at most
+NEWEST: Final = 32  # values of one monitor that are kept for a client which does not read
 
 
 class Circuit(server.VirtualCircuit):  # type: ignore[misc]  # caproto has no types
@@ -29,6 +38,51 @@ class Circuit(server.VirtualCircuit):  # type: ignore[misc]  # caproto has no ty
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
         self.subscription_queue = _Line()
+        self.heard = time.monotonic()  # when it said something last
+
+    @property
+    def held(self) -> int:
+        """How many channels and monitors it has."""
+        return len(self.circuit.channels) + sum(len(subs) for subs in self.subscriptions.values())
+
+    def watching(self, field: Any) -> int:
+        """How many monitors of a field it has."""
+        return sum(len(subs) for spec, subs in self.subscriptions.items() if spec.db_entry is field)
+
+    async def recv(self) -> None:
+        """Read on. A client that begins a message of more than `MESSAGE` bytes is left."""
+        await super().recv()
+        self.heard = time.monotonic()
+        if len(self.circuit._data) > MESSAGE:  # noqa: SLF001 (what is not yet a whole message; caproto has no other way in)
+            self.log.warning("a client that sent a message of more than %d bytes was left", MESSAGE)
+            await self.leave()
+            raise DisconnectedCircuit
+
+    async def _command_queue_iteration(self, command: Any) -> Any:
+        await asyncio.sleep(0)  # others have their turn between two commands of this client
+        return await super()._command_queue_iteration(command)
+
+    async def _process_command(self, command: Any) -> Any:
+        if isinstance(command, caproto.WriteRequest | caproto.WriteNotifyRequest):
+            channel, _ = self._get_db_entry_from_command(command)
+            why = self._no_put(channel, command)
+            if why is not None:
+                self.log.warning("%s: %s", channel.name, why.why)
+                waits = isinstance(command, caproto.WriteNotifyRequest)
+                return [channel.write(ioid=command.ioid, status=why.status, data_count=1)] if waits else []
+        answer = await super()._process_command(command)
+        if isinstance(command, caproto.CreateChanRequest | caproto.EventAddRequest):
+            watched = isinstance(command, caproto.EventAddRequest)
+            field = self._get_db_entry_from_command(command)[1] if watched else None
+            await self.context.make_room(field)
+        return answer
+
+    def _no_put(self, channel: Any, command: Any) -> Refused | None:
+        """Why a put is not carried out."""
+        stops = channel.name.partition("{")[0].endswith((".STOP", ".SPMG"))
+        if len(self.tasks.tasks) > PUTS * (1 + stops) + 2:  # besides its puts it has two
+            return Refused(f"more than {PUTS} puts of one client are under way", CAStatus.ECA_PUTFAIL)
+        return not_whole(command)
 
     async def send(self, *commands: Any) -> None:
         """Send at once, but for the answer to a put: it waits behind the monitors that were posted before."""
@@ -56,10 +110,10 @@ class Circuit(server.VirtualCircuit):  # type: ignore[misc]  # caproto has no ty
         except asyncio.CancelledError:
             return  # who cancels this waits for its end
         except DisconnectedCircuit:
-            await self._leave()
+            await self.leave()
         except Exception:
             self.log.exception("a client could not be told")
-            await self._leave()
+            await self.leave()
 
     async def command_queue_loop(self) -> None:
         """Do what the client says. One that breaks the protocol beyond repair is left, and the others go on."""
@@ -67,13 +121,22 @@ class Circuit(server.VirtualCircuit):  # type: ignore[misc]  # caproto has no ty
             await super().command_queue_loop()
         except Exception:
             self.log.exception("a client that broke the protocol was left")
-            await self._leave()
+            await self.leave()
 
-    async def _leave(self) -> None:
-        self._sub_task = None  # it may be the one that runs this: it ends by itself
+    async def leave(self) -> None:
+        """Be rid of this client at once, whatever it has not taken yet."""
+        if asyncio.current_task() is getattr(self, "_sub_task", None):
+            self._sub_task: Any = None  # it ends by itself
+        self.client.writer.transport.abort()
         await self._on_disconnect()
         self.circuit.disconnect()
         await self.context.circuit_disconnected(self)
+
+    async def _on_disconnect(self) -> None:
+        specs, here = list(self.subscriptions), self.connected
+        await super()._on_disconnect()
+        if here:
+            self.context.forget(self, specs)
 
 
 def _itself(command: Any) -> Any:
@@ -109,12 +172,44 @@ class Context(server.Context):  # type: ignore[misc]
     def __init__(self, pvs: dict[str, Any], interfaces: list[str] | None) -> None:
         super().__init__(pvs, interfaces)
         self.subscription_queue = _AtOnce(self)
+        self._room = Room(self.circuits)
+        for channel in pvs.values():
+            channel.max_subscription_backlog = NEWEST
 
     async def close(self) -> None:
         """Leave the clients that are still there."""
         for circuit in list(self.circuits):
             circuit.client.close()
         await asyncio.sleep(0)
+
+    async def tcp_handler(self, client: Any, address: Any) -> None:
+        """Serve a client. Where there are `CLIENTS` already, the one that was silent longest leaves."""
+        silent = self._room.too_silent()
+        if silent is not None:
+            self.log.warning("more than %d clients: the one that was silent longest was left", CLIENTS)
+            await silent.leave()
+        await super().tcp_handler(client, address)
+
+    def forget(self, circuit: Circuit, specs: list[Any]) -> None:
+        """Keep nothing of a client that left, nor of what it monitored in its own way."""
+        for spec in specs:
+            if not self.subscriptions[spec]:
+                del self.subscriptions[spec]
+        for kept in (self.last_dead_band, self.last_sync_edge_update):
+            for sub in [sub for sub in kept if sub.circuit is circuit]:
+                del kept[sub]
+
+    async def make_room(self, field: Any | None) -> None:
+        """A channel was made, or a monitor of `field`: leave the client that has most, where all have too many."""
+        found = self._room.too_many(field)
+        if found is not None:
+            circuit, why = found
+            circuit.log.warning("%s: the client with most of them was left", why)
+            await circuit.leave()
+
+    async def _broadcaster_recv_datagram(self, data: bytes, address: Any) -> None:
+        if len(data) <= DATAGRAM:
+            await super()._broadcaster_recv_datagram(data, address)
 
     async def subscription_queue_loop(self) -> None:
         """Nothing to do: updates go to the circuits when they are posted."""
