@@ -103,7 +103,6 @@ def test_a_client_that_says_much_at_once_keeps_no_other_waiting(monkeypatch: pyt
 
     async def test(ioc: Served) -> None:
         loud, client = await ioc.client(), await ioc.client()
-        channel = await loud.channel("T:m1")
         stop = await client.channel("T:m1.STOP")
         served_in_order.clear()
         loud.writer.write(b"".join(request(18, b"T:m1\0", 0, 0, number, 13) for number in range(9, 3009)))
