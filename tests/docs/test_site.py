@@ -16,12 +16,15 @@ ROOT = Path(__file__).parents[2]
 LESS = ("-D", "extensions=myst_parser,sphinx.ext.autodoc", "-D", "toc_object_entries=0")
 """Without the pages of the sources, and without the list of a page's functions at its side: two thirds of the work."""
 
+SPHINX = "import gc, sys; gc.disable(); from sphinx.cmd.build import main; sys.exit(main(sys.argv[1:]))"
+"""Looking for garbage is a sixth of its work, and it is over soon."""
+
 
 @pytest.fixture(scope="module", params=[LESS, pytest.param((), marks=pytest.mark.slow)], ids=["text", "whole"])
 def site(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """All pages that are written by hand or from docstrings; `whole` is what `make docs` builds."""
     folder = tmp_path_factory.mktemp("site")
-    build = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", *request.param,
+    build = [sys.executable, "-c", SPHINX, "-q", "-W", "--keep-going", "-b", "html", *request.param,
              "-d", folder / "trees", "docs"]  # fmt: skip
     done = subprocess.run(
         [*map(str, build), str(folder / "html")], cwd=ROOT, capture_output=True, text=True, check=False
