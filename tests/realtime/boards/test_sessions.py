@@ -258,7 +258,7 @@ def test_a_reset_that_is_over_before_the_first_step_stops_the_motion(ahead: int)
 
 
 def test_no_tap_is_lost_before_a_stop_comes_into_force() -> None:
-    for seed in seeds(24):
+    for seed in (121, *seeds(24)):  # 121: of two motors one had no stop yet that the reset of the other could set off
         tapped(seed)
 
 

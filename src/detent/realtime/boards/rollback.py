@@ -222,6 +222,11 @@ class Rollback(Outgoing):
                 continue
             if ledger is not stopped:
                 if new != old[ledger.name] and ledger.guard.armed.get(event.input) == int(event.level):
+                    stands = ledger.stepper.stands(self._wall())
+                    if stands is not None and not self.boards.stops[ledger.name].alive:
+                        ledger.guard.fired()  # it has yet to be armed, and no step has left: there is nothing to stop
+                        self._tell_anew(ledger, stands, count, new)
+                        continue
                     ledger.awaits = event.input, self._wall()
                     ledger.stepper.halt()
                     self.boards.stops[ledger.name].now()  # what it was sent for later, when the input may be over
@@ -231,12 +236,15 @@ class Rollback(Outgoing):
                     ledger.end_told(now)
                     self._contradicted(ledger, stopped, lost)
                 continue
-            ledger.stepper.rewind(event.shaft, slipped=bool(event.dry))
-            force = ledger.motion_after(count)
-            if force is not None:
-                ledger.stepper.tell(force)
-            for motion in new:
-                ledger.stepper.tell(motion)
+            self._tell_anew(ledger, event.shaft, count, new, slipped=bool(event.dry))
+
+    @staticmethod
+    def _tell_anew(ledger: AxisLedger, shaft: int, count: int, new: list[Motion], *, slipped: bool = False) -> None:
+        """The stepper stands at `shaft`: tell it the motion in force behind its first `count` ones, and the `new`."""
+        ledger.stepper.rewind(shaft, slipped=slipped)
+        force = ledger.motion_after(count)
+        for motion in (*([force] if force is not None else []), *new):
+            ledger.stepper.tell(motion)
 
     def _tell_out(
         self, out: Out, old: list[tuple[Ns, bool]], new: list[tuple[Ns, bool]], at: Ns, stopped: AxisLedger

@@ -243,8 +243,18 @@ class Stepper:
 
     def over(self, wall: WallNs) -> bool:
         """Whether it rests, and the last pulse sent has come."""
+        return not self._spans and self._all_come(wall)
+
+    def stands(self, wall: WallNs) -> int | None:
+        """Where, if every pulse sent has come, and none is waited for that was too late; None: it moves, or may have.
+
+        What it was told of, and is not sent yet, may still come.
+        """
+        return self._sent if self._all_come(wall) and not self._halted else None
+
+    def _all_come(self, wall: WallNs) -> bool:
         last = max((channel.last for channel in self._channels if channel.last is not None), default=NOWHERE)
-        return not self._spans and self._core.clock.tick_at(wall) > last
+        return self._core.clock.tick_at(wall) > last
 
     def adopt(self, shaft: int) -> None:
         """The shaft of the axis is `shaft` now, where the firmware stands: at the start, and behind a restart."""
