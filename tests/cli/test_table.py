@@ -114,7 +114,9 @@ def test_a_bad_line_of_a_file_is_named(tmp_path: Path, capsys: Capture) -> None:
     ):
         file.write_text(text)
         assert detent("table", file) == 2
-        assert message in capsys.readouterr().err
+        told = capsys.readouterr().err
+        assert message in told
+        assert str(file) in told
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path: Path, capsys: Capture) -> None:

@@ -37,6 +37,17 @@ def test_a_pipe_is_read_to_its_end_however_it_comes(tmp_path: Path) -> None:
     writing.join()
 
 
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="open descriptors are counted in /proc")
+def test_what_cannot_be_read_is_told_by_its_name_and_let_go_of(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "nothing", Path("/proc/self/mem")):
+        for _ in range(3):
+            before = len(os.listdir("/proc/self/fd"))
+            with pytest.raises(OSError, match="r") as raised:
+                read_whole(path)
+            assert raised.value.filename in (str(path), path)
+            assert len(os.listdir("/proc/self/fd")) == before
+
+
 def test_a_file_that_never_ends_is_refused_at_its_bound(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="it is larger than 0 MiB"):
         read_whole(Path("/dev/zero"), 1000)

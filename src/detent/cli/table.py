@@ -82,8 +82,9 @@ def table(
         check_outputs((bin_, hex_, text), [Path(curve)], asked=overwrite)
         clocks = _clocks(interval)
         wanted = {"peak": peak, "angular": angular, "phase": phase, "low": low, "high": high}
-        law, seconds, name = _curve(curve, {key: value for key, value in wanted.items() if value is not None}, duration)
+        name = curve
         try:
+            law, seconds, name = _curve(curve, {key: it for key, it in wanted.items() if it is not None}, duration)
             made = compiled(law, seconds, clocks)
         except CurveError as error:
             raise CurveError(f"{name}: {error}") from None

@@ -104,7 +104,7 @@ def profile(points: Sequence[tuple[float, float]]) -> Profile:
 def read_profile(load: Load, text: str, file: str, radians: Mapping[str, float]) -> Load:
     """The load with the torque that a CSV text gives: a first line 's, Nm', or a unit of `radians` (of the shaft).
 
-    MotorError names the line.
+    MotorError names the file, and the line if it is about one.
     """
     unit, points = "", []
     for k, words in columns.lines(text):
@@ -122,5 +122,8 @@ def read_profile(load: Load, text: str, file: str, radians: Mapping[str, float])
         points.append((place * radians.get(unit, 1.0), torque))
         if len(points) > MOST_POINTS:
             raise MotorError(f"{file}: more than {MOST_POINTS} points")
-    made = profile(points)
+    try:
+        made = profile(points)
+    except MotorError as error:
+        raise MotorError(f"{file}: {error}") from None
     return replace(load, **{"torque_by_time" if unit == "s" else "torque_by_position": made})  # type: ignore[arg-type]

@@ -20,12 +20,17 @@ def read_whole(path: Path, most: int = MOST_BYTES) -> bytes:
     A pipe to which nobody writes is not waited for.
     """
     descriptor = os.open(path, os.O_RDONLY | NO_WAIT | getattr(os, "O_BINARY", 0))
-    with os.fdopen(descriptor, "rb") as file:
+    try:
+        file = os.fdopen(descriptor, "rb", closefd=False)
         if stat.S_ISFIFO(os.fstat(descriptor).st_mode):
             if not select.select([descriptor], [], [], PIPE)[0]:
-                raise OSError(errno.EAGAIN, "it is a pipe, and nobody writes to it", str(path))
+                raise OSError(errno.EAGAIN, "it is a pipe, and nobody writes to it")
             os.set_blocking(descriptor, True)
         data = file.read(most + 1)
+    except OSError as error:  # of a descriptor the system does not say which file it is
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    finally:
+        os.close(descriptor)
     if len(data) > most:
         raise OSError(errno.EFBIG, f"it is larger than {most >> 20} MiB: no file that is meant here is", str(path))
     return data
