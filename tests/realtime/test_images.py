@@ -1,3 +1,4 @@
+import errno
 import os
 import stat
 from collections.abc import Iterator
@@ -101,12 +102,22 @@ def test_a_damaged_image_is_moved_aside_and_never_overwritten(images: Kept) -> N
         assert not path.exists()
 
 
-def test_what_cannot_be_read_is_moved_aside(images: Kept) -> None:
-    images.path("bar").mkdir()
-    found = images.load()
-    assert found.images == {}
-    assert "Is a directory; it is " in found.reports[0]
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EIO, errno.ESTALE, errno.EMFILE])
+def test_what_the_system_does_not_let_be_read_is_left_alone_and_nothing_is_served(
+    images: Kept, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    """It may be a good image: a unit that began empty in its place would store over it."""
     assert images.save("bar", IMAGE)
+    path = images.path("bar")
+
+    def refused(*_: object) -> bytes:
+        raise OSError(number, os.strerror(number), str(path))
+
+    with monkeypatch.context() as broken:
+        broken.setattr("detent.realtime.images.read_kept", refused)
+        with pytest.raises(ImagesUnusable, match=f"{path} cannot be read: {os.strerror(number)}; .* --state DIR"):
+            images.load()
+    assert images.load().images == {"bar": IMAGE}
 
 
 def test_what_cannot_be_moved_aside_is_said(images: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -342,7 +353,7 @@ def test_another_models_image_gets_the_name_of_that_and_comes_back_with_it(tmp_p
     assert not list(tmp_path.glob("*damaged*"))
 
 
-@pytest.mark.parametrize("kind", ["pipe", "link", "huge"])
+@pytest.mark.parametrize("kind", ["pipe", "link", "huge", "folder"])
 def test_what_is_no_file_that_an_image_could_be_is_refused_at_once(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "cell.bar.eeprom"
     match kind:
@@ -350,6 +361,8 @@ def test_what_is_no_file_that_an_image_could_be_is_refused_at_once(tmp_path: Pat
             os.mkfifo(path)
         case "link":
             path.symlink_to(tmp_path / "elsewhere")
+        case "folder":
+            path.mkdir()
         case "huge":
             with path.open("wb") as file:
                 file.truncate(2 << 30)

@@ -139,6 +139,8 @@ def serve(
             url = _control(service, control_at, token)
         except (Problem, EndpointError) as error:
             asked_wrongly(error)
+        except ImagesUnusable as error:
+            failed(error)  # a service tries again: the disk may come back
         except ValueError as error:
             asked_wrongly(Problem("", "", str(error)))
         # before anybody is told that it is ready: who hears that may end it at once

@@ -111,7 +111,10 @@ class Images:
         return self._paths[unit]
 
     def load(self) -> Loaded:
-        """Read what is there. What cannot be read is moved aside, and its unit starts empty."""
+        """Read what is there. What is no image is moved aside, and its unit starts empty.
+
+        What the system does not let be read may be a good image: ImagesUnusable, and nothing is changed.
+        """
         found = Loaded({}, self._reports)
         self._reports = []
         for unit, path in self._paths.items():
@@ -127,7 +130,10 @@ class Images:
             except FileNotFoundError:
                 continue
             except OSError as error:
-                found.reports.append(self.set_aside(unit, error.strerror or str(error)))
+                raise ImagesUnusable(
+                    f"the EEPROM image {path} cannot be read: {error.strerror or error}; mend that, move it away to "
+                    f"begin with an empty memory, or {REMEDY}"
+                ) from error
             except ImageUnreadable as error:
                 found.reports.append(self.set_aside(unit, str(error)))
         return found
@@ -230,7 +236,7 @@ def _check_kind(path: Path) -> None:
     except OSError:
         return
     kinds = {stat.S_IFIFO: "a pipe", stat.S_IFLNK: "a symbolic link", stat.S_IFSOCK: "a socket",
-             stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}  # fmt: skip
+             stat.S_IFCHR: "a device", stat.S_IFBLK: "a device", stat.S_IFDIR: "a folder"}  # fmt: skip
     what = kinds.get(stat.S_IFMT(found.st_mode), "")
     if not what and found.st_size > MOST_BYTES:
         what = f"a file of {found.st_size} bytes"
