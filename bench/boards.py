@@ -286,12 +286,12 @@ inputs = { EOT = "^gpio10", HOME = "^gpio11" }
         driven = opened.drive(cell, stores)
         opened.begin(driven, Pace(clock=driven.clock))
         driven.send(0, cell.serial_unit("x").frame("H+"))
-        while driven.rewinds < 2:
+        while driven.rollback.rewinds < 2:
             now[0] += 500 * US
             driven.run_to(driven.boards.cell_at(now[0]))
-            before, begin = driven.rewinds, process_time()
+            before, begin = driven.rollback.rewinds, process_time()
             driven.serve()
-            if driven.rewinds > before:
+            if driven.rollback.rewinds > before:
                 taken.append(process_time() - begin)
                 begin = process_time()
                 cell.copy()

@@ -51,7 +51,7 @@ def real_state(driven: Driven) -> Answer:
         told = as_json(state._replace(standing=state.standing.value))  # type: ignore[arg-type]
         axes[f"{state.unit}.{state.axis}" if state.axis else state.unit] = told
     boards: dict[str, Json] = {state.board: as_json(state) for state in driven.board_states()}
-    return {"axes": axes, "boards": boards, "escaped": driven.escaped, "stops": driven.rewinds}
+    return {"axes": axes, "boards": boards, "escaped": driven.rollback.escaped, "stops": driven.rollback.rewinds}
 
 
 def unit_state(subject: Subject, name: str) -> Answer:

@@ -19,9 +19,9 @@ from detent.cell.outside import no_store
 from detent.cell.real_pins import behind_pins, unreal
 from detent.cell.stores import Stores
 from detent.outputs.units import views
+from detent.realtime.boards.certainty import CERTAIN
 from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.driven import Driven
-from detent.realtime.boards.outgoing import CERTAIN
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.states import News, Standing, Weight
 from detent.realtime.cell_source import CellSource
@@ -75,7 +75,7 @@ class DrivenEngine(Engine):
         self._taken: deque[Ns] = deque()  # when each action was done, of those that both cells have
         self._count = 0  # of those that the machine's cell has, ever
         self._looked: WallNs = 0
-        self._driven.on_taken_back = self._taken_back
+        self._driven.rollback.on_taken_back = self._taken_back
         shafts = {name: unit.shaft for name, unit in described.units.items()}
         self.history = History(cell, self._stores, shafts=shafts, on_stop=lambda: None)
         self.history.on_notable = self._mark_entry

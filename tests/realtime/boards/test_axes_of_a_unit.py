@@ -126,7 +126,7 @@ class Session:
     def check(self) -> int:
         bench = self.bench
         bench.check_inputs()
-        assert bench.driven.escaped == 0
+        assert bench.driven.rollback.escaped == 0
         for name, state in self.axes().items():
             if self.stood(name, state):
                 continue

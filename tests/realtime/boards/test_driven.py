@@ -98,7 +98,7 @@ def test_a_gentle_stop_keeps_its_ramp() -> None:
         assert "x.UI1" not in bench.driven.axes()[0].armed
         bench.press("x.UI1", 0)
         bench.rest()
-        assert bench.driven.rewinds == 0
+        assert bench.driven.rollback.rewinds == 0
         assert bench.news == []
         assert bench.position("x") == bench.driven.axes()[0].shaft > 100
 
@@ -114,7 +114,7 @@ def test_enable_holds_the_pulse_in_the_firmware() -> None:
         low = bench.boards.cell_at(bench.wall) - LEAD
         bench.press("x.ENABLE", 0)
         bench.run(300 * MS)
-        assert bench.driven.rewinds == 1
+        assert bench.driven.rollback.rewinds == 1
         high = bench.boards.cell_at(bench.wall) - LEAD
         bench.press("x.ENABLE", 1)
         bench.run(20 * MS)
@@ -133,7 +133,7 @@ def test_replies_wait_until_nothing_can_change_them() -> None:
         bench.run(200 * MS)
         assert bench.said("x") == "V+0\r"
         for board_ns, at, _ in bench.heard[0]:
-            held = board_ns - bench.driven._align - at
+            held = board_ns - bench.driven.outgoing.clock.offset - at
             assert LEAD + 4 * MS <= held <= LEAD + 6 * MS
 
 
@@ -143,7 +143,7 @@ def test_replies_at_once_for_hosts_that_do_not_wait() -> None:
         bench.type("x", "V1")
         bench.run(200 * MS)
         for board_ns, at, _ in bench.heard[0]:
-            assert 0 <= board_ns - bench.driven._align - at <= MS
+            assert 0 <= board_ns - bench.driven.outgoing.clock.offset - at <= MS
 
 
 DCB = """
@@ -169,7 +169,7 @@ def positions(bench: Bench) -> list[int]:
         bench.run(7 * MS)
         bench.send("x", b"Z 0\r")
     bench.run(200 * MS)
-    assert bench.driven.rewinds == 1
+    assert bench.driven.rollback.rewinds == 1
     assert max(place for _, place in bench.edges("x")) == 200
     words = [word.split() for word in bench.said("x").split("\n")]
     return [int(word[-1]) for word in words if word[:2] == ["Z", "0"] and len(word) == 3]
@@ -180,7 +180,7 @@ def test_what_a_host_heard_too_early_is_told() -> None:
     text = DCB.replace('serial = "fake"', 'serial = "fake"\nreplies = "at once"')
     with Bench(text, switches={"x.LIMIT-A": ("x", 200, 10**6)}) as bench:
         assert max(positions(bench)) > 200
-        assert bench.driven.escaped > 0
+        assert bench.driven.rollback.escaped > 0
         assert any("took it back" in news.text for news in bench.news)
 
 
@@ -189,7 +189,7 @@ def test_no_held_reply_contradicts() -> None:
         read = positions(bench)
         assert read == sorted(read)
         assert read[-1] == 200
-        assert bench.driven.escaped == 0
+        assert bench.driven.rollback.escaped == 0
         assert bench.news == []
 
 
@@ -211,7 +211,7 @@ def test_memory_is_written_once_and_only_when_it_is_certain() -> None:
                 before = len(written)
                 bench.type("x", "S")  # within the lead of the limit
         bench.rest()
-        assert bench.driven.rewinds == 1
+        assert bench.driven.rollback.rewinds == 1
         assert saved
         assert len(written) == before + 1
         assert written[-1] == ("x", bench.cell.controller("x").kept_memory())
@@ -616,7 +616,7 @@ def test_a_stop_longer_ago_than_is_kept_is_a_fault_where_the_motor_stands() -> N
         bench.type("x", "M 2000")
         while bench.position("x") < 195:
             bench.run(1 * MS)
-        bench.driven.past.clear()
+        bench.driven.outgoing.past.clear()
         bench.run(500 * MS)
         bench.rest()
         state = bench.driven.axes()[0]

@@ -107,7 +107,7 @@ def test_three_axes_home_run_into_limits_and_jog_at_once() -> None:
         assert bench.position("y") == 150
         assert bench.position("z") == -77
         assert -60 <= bench.position("x") <= -40
-        assert bench.driven.rewinds == 4
+        assert bench.driven.rollback.rewinds == 4
         for unit in "xyz":
             assert same_pulses(bench, unit, unit) > 0
         bench.press("x.JOG1", 0)
@@ -164,7 +164,7 @@ def test_two_motors_with_hard_limits_keys_and_a_reset() -> None:
         bench.rest()
         assert same_pulses(bench, "t.X", "t", "X") == 300
         assert same_pulses(bench, "t.Y", "t", "Y") > 50
-        assert bench.driven.rewinds == 2
+        assert bench.driven.rollback.rewinds == 2
         assert bench.news == []
 
 
@@ -193,7 +193,7 @@ def test_emergency_braking_keeps_its_curve() -> None:
         bench.run(20 * MS)
         bench.rest()
         assert 0 < same_pulses(bench, "x", "x") < 20000
-        assert bench.driven.rewinds == 0
+        assert bench.driven.rollback.rewinds == 0
         assert bench.news == []
 
 
@@ -333,7 +333,7 @@ def test_two_boards_keep_one_time_and_one_may_fail() -> None:
         bench.rest()
         assert bench.position("x") == bench.position("y") == 9
         assert (same_pulses(bench, "x", "x"), same_pulses(bench, "y", "y")) == (90 + 81, 140 + 131)
-        assert bench.driven.rewinds == 4
+        assert bench.driven.rollback.rewinds == 4
         bench.type("x", "+400")
         bench.type("y", "+400")
         bench.run(200 * MS)

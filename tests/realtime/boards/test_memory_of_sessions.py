@@ -145,7 +145,7 @@ class Session:
             bench.rest()
             assert self.disk.images == self.ideal(), bench.news
             assert self.disk.images == [] or self.disk.images[-1] == bench.cell.controller("x").kept_memory()
-            assert bench.driven.escaped == 0
+            assert bench.driven.rollback.escaped == 0
             assert self.rough or not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
             return len(self.disk.images)
 

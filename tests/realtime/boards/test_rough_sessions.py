@@ -126,7 +126,7 @@ def session(seed: int) -> int:
             assert state.known or state.board in rough.restarted, state
             if state.board not in rough.restarted:
                 assert state.shaft == bench.position(state.unit), state.unit
-        assert replies == "at once" or bench.driven.escaped == 0
+        assert replies == "at once" or bench.driven.rollback.escaped == 0
         return sum(news.weight is Weight.FAULT for news in bench.news)
 
 

@@ -141,7 +141,7 @@ def session(kind: str, seed: int) -> int:
         bench.rest(20 * SECOND)
         bench.check_inputs()
         assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
-        assert bench.driven.escaped == 0
+        assert bench.driven.rollback.escaped == 0
         for state, stepper in zip(bench.driven.axes(), what.steppers, strict=True):
             assert state.standing is Standing.DRIVEN
             assert state.moving or state.shaft == bench.position(stepper)
@@ -234,7 +234,7 @@ def tapped(seed: int) -> None:
         assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
         assert not any(state.moving for state in bench.driven.axes()), "a reset was lost"
         assert [state.shaft for state in bench.driven.axes()] == [bench.position("x.X"), bench.position("x.Y")]
-        assert bench.driven.escaped == 0
+        assert bench.driven.rollback.escaped == 0
         bench.check_inputs()
 
 

@@ -96,7 +96,7 @@ def session(seed: int, *, writes: bool) -> tuple[int, int]:
         assert bench.boards.boards["b"].state.value == "ready"
         assert state.shaft == bench.position("x")
         assert state.shaft == bench.boards.steppers["x"].counted()
-        assert bench.driven.escaped == 0
+        assert bench.driven.rollback.escaped == 0
         assert sum("slipped" in news.text for news in bench.news) == state.slips
         if not down:
             never_closer(bench)

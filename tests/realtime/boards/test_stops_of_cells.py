@@ -84,9 +84,9 @@ def compare(case: Case, lead: int, seed: int) -> int:
         assert bench.cell.controller("x").status(bench.cell.now) == status
         heard = "".join(chr(h.char.value & 127) for h in wanted.lines[0].take())
         assert bench.said("x") == heard
-        assert bench.driven.escaped == 0
+        assert bench.driven.rollback.escaped == 0
         bench.check_inputs()
-        return bench.driven.rewinds
+        return bench.driven.rollback.rewinds
 
 
 def homing(random: Random) -> Case:

@@ -69,7 +69,7 @@ def run(seed: int) -> int:
         assert state.standing is Standing.DRIVEN
         assert state.shaft == bench.position("x") == (places[-1] if places else 0)
         assert bench.cell.controller("x").status(bench.cell.now).pulses == len(places)
-        assert bench.driven.escaped == 0
+        assert bench.driven.rollback.escaped == 0
         return state.stops
 
 
@@ -115,7 +115,7 @@ def asked_while_late(seed: int) -> int:
         bench.type("x", "Z 0")
         bench.run(200 * MS)
         bench.check_inputs()
-        assert bench.driven.escaped == 0, bench.news
+        assert bench.driven.rollback.escaped == 0, bench.news
         assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
         state = bench.driven.axes()[0]
         assert state.shaft == bench.position("x") <= edge

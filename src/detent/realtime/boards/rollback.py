@@ -1,100 +1,88 @@
 """A stop in the firmware takes the cell back to where it happened, and the boards are told what is different since."""
 
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
-from detent.cell.actions import Action, SetPin, TimedAction
+from detent.cell.actions import Action, TimedAction
 from detent.cell.recording import Batch
 from detent.controllers.device import Powered
 from detent.lines.line import Heard
 from detent.pins import Level, PinSet
 from detent.realtime.boards.axis_ledger import AxisLedger, Motion
 from detent.realtime.boards.channels import alike
-from detent.realtime.boards.events import (
-    Stopped,
-)
+from detent.realtime.boards.events import Stopped
+from detent.realtime.boards.faults import Faults
 from detent.realtime.boards.outgoing import Out, Outgoing
 from detent.realtime.boards.past import Moment
 from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.pace import WallNs
 from detent.ticks import MS, Ns
 
 AWAITED: Ns = 100 * MS  # reports of a trigger come every 25 ms
 MOST_SINGLES = 8  # pulses in a row that an input stops one by one
 
 
-class Rollback(Outgoing):
-    """What is done when the firmware has stopped an axis."""
+class Rollback:
+    """What is done when the firmware has stopped an axis. What cannot be lived through once more is a fault."""
 
-    def _stopped(self, event: Stopped) -> None:
+    def __init__(self, outgoing: Outgoing, faults: Faults) -> None:
+        self._outgoing, self._faults = outgoing, faults
+        self._cell, self._boards, self._plan, self._ledgers, self._past, self._wall = (
+            outgoing.cell,
+            outgoing.boards,
+            outgoing.plan,
+            outgoing.ledgers,
+            outgoing.past,
+            outgoing.wall,
+        )
+        self.on_taken_back: Callable[[Ns], None] = lambda at: None  # what the cell did behind `at` did not happen
+        self.escaped = 0  # characters that hosts heard though they were taken back
+        self.rewinds = 0
+        self.longest_rewind: WallNs = 0
+
+    def stopped(self, event: Stopped) -> None:
         """The firmware has stopped an axis: the cell is taken back to there."""
         began = self._wall()
-        ledger = self._by_stepper[event.stepper]
-        other, given = self._given_at.get(event.input, (ledger, event.at))
-        if other is not ledger and event.at < given and ledger.motion is None:
-            self._stopped_too(
-                ledger, event
-            )  # it is later than the other, and the input has stopped it in the cell already
+        ledger = self._outgoing.by_stepper[event.stepper]
+        if ledger.motion is None and self._outgoing.inputs.stopped_before(event, ledger):
+            self.stopped_too(ledger, event)  # the input has stopped it in the cell already
             return
         ledger.guard.fired()
         ledger.stops += 1
         self.rewinds += 1
-        unit, pin = self.plan.inputs[event.input]
-        at = min(ledger.instant_of(event.shaft, event.at), self.cell.now)
-        if self.past.moments:
-            at = max(at, self.past.moments[0].now)
-        if not self.past.reaches(at) or ledger.place_at(at) != event.shaft:
-            self._fault(ledger, f"{event.input} has stopped it at {event.shaft}, and nobody knows when that was")
-            self._place(ledger, event.shaft)
+        at = min(ledger.instant_of(event.shaft, event.at), self._cell.now)
+        if self._past.moments:
+            at = max(at, self._past.moments[0].now)
+        if not self._past.reaches(at) or ledger.place_at(at) != event.shaft:
+            self._faults.fault(ledger, f"{event.input} has stopped it at {event.shaft}, and nobody knows when that was")
+            self._faults.place(ledger, event.shaft)
             return
         if self._gates(ledger, event):
             what = f"{event.input} lets every single pulse through, and on real pins each takes some milliseconds"
-            self._fault(ledger, f"{what}: leave the input out, and wire the detector to the driver")
-            self._place(ledger, event.shaft)
+            self._faults.fault(ledger, f"{what}: leave the input out, and wire the detector to the driver")
+            self._faults.place(ledger, event.shaft)
             return
-        # what the switches of this axis are at was so at the stop already: it stands, and reports take their time
-        switches = {(unit, other) for other in self.cell.controller(unit).switches(ledger.what.axis)}
-        if (unit, pin) in switches:
-            ledger.lost, ledger.known = False, True  # as far as a switch tells it
-        others = {
-            name: int(found)
-            for name, found in event.levels.items()
-            if name != event.input and self.plan.inputs[name] in switches
-        }
-        late = {self.plan.inputs[name] for name in (*others, event.input)}
-        fresh = {(set_.unit, set_.pin) for when, set_, _ in self._reports if when > at}
-        actions: list[Action] = []
-        for name, found in others.items():
-            place = self.plan.inputs[name]
-            if place in fresh or self._given[name] != found:
-                actions.append(SetPin(*place, found))
-                self._raw[name] = self._given[name] = found
-        self._given_at[event.input] = ledger, at
-        level = int(event.level)
-        actions.append(SetPin(unit, pin, level))
-        drop = {(when, set_) for when, set_, _ in self._reports if when > at and (set_.unit, set_.pin) in late}
-        self._reports = deque((item for item in self._reports if item[:2] not in drop), maxlen=256)
+        actions, drop = self._outgoing.inputs.taken_back(ledger, event, at)
         self._take_back(ledger, at, actions, lambda action: (action.at, action.what) in drop, event)
-        self._raw[event.input], self._given[event.input] = int(event.present), level
-        if int(event.present) != level:
-            self._give(event.input, int(event.present), self.clock())
-        self._arm()
-        self.commit()
+        if event.present is not event.level:
+            self._outgoing.give(event.input, int(event.present))
+        self._outgoing.arm()
+        self._outgoing.commit()
         self.longest_rewind = max(self.longest_rewind, self._wall() - began)
 
-    def _ran_dry(self, event: Stopped) -> None:
+    def ran_dry(self, event: Stopped) -> None:
         """Pulses did not reach the board in time, and it has stopped before them: what it did not make comes later.
 
         The cell lives through it once more, and does the same, so that every input is armed again where it was.
         """
-        ledger = self._by_stepper[event.stepper]
+        ledger = self._outgoing.by_stepper[event.stepper]
         found = [(ledger.instant_of(event.shaft, near), near) for near in event.dry]
-        at = min(min(found, key=lambda pair: abs(pair[0] - pair[1]))[0], self.cell.now)
+        at = min(min(found, key=lambda pair: abs(pair[0] - pair[1]))[0], self._cell.now)
         guarded = ledger.guard.watched(at)
         ledger.guard.fired()
-        if ledger.place_at(at) != event.shaft or (guarded and not self.past.reaches(at)):
-            self._fault(ledger, f"it was late, and stands at {event.shaft}: nobody knows when that was")
-            self._place(ledger, event.shaft)
+        if ledger.place_at(at) != event.shaft or (guarded and not self._past.reaches(at)):
+            self._faults.fault(ledger, f"it was late, and stands at {event.shaft}: nobody knows when that was")
+            self._faults.place(ledger, event.shaft)
             return
         if guarded:
             self._take_back(ledger, at, (), lambda action: False, event)
@@ -102,15 +90,8 @@ class Rollback(Outgoing):
             ledger.stepper.rewind(event.shaft, slipped=True)
             for motion in ledger.motions_from(at):
                 ledger.stepper.tell(motion)
-        self._arm()
-        self.commit()
-
-    def _heard(self, levels: Mapping[str, bool]) -> None:
-        """Inputs were asked for their levels, and no report tells them again: what the cell has not, it gets now."""
-        for name, found in levels.items():
-            self._raw[name] = int(found)
-            if self._given[name] != int(found):
-                self._give(name, int(found), self.clock())
+        self._outgoing.arm()
+        self._outgoing.commit()
 
     def _gates(self, ledger: AxisLedger, event: Stopped) -> bool:
         """Whether an input has stopped every single pulse of late."""
@@ -134,69 +115,69 @@ class Rollback(Outgoing):
         levels: dict[str, list[tuple[Ns, bool]]] = {}
         counts: list[int] = []
         places: dict[str, int] = {}
-        if not self.past.moments:
-            self.past.keep()
+        if not self._past.moments:
+            self._past.keep()
 
         def arrived(moment: Moment) -> None:
             """The cell is at `at` again: what it did up to there was told before."""
-            batches = self._batches()
+            batches = self._outgoing.batches()
             ahead = list(moment.counts)
-            for place, ledger in enumerate(self.ledgers):
+            for place, ledger in enumerate(self._ledgers):
                 ahead[place] += sum(
                     isinstance(entry, (MotionStarted, MotionCut, MotionEnded)) and entry.axis == ledger.what.axis
                     for unit, entries in batches
-                    if ledger in self._of_unit.get(unit, ())
+                    if ledger in self._outgoing.of_unit(unit)
                     for entry in entries
                 )
-            counts.extend(ahead[: len(self.ledgers)])
-            for ledger, count in zip(self.ledgers, counts, strict=True):
+            counts.extend(ahead[: len(self._ledgers)])
+            for ledger, count in zip(self._ledgers, counts, strict=True):
                 before = ledger.motions.before(count)
                 here = ledger.place_at(at)
                 motions[ledger.name] = ledger.take_back(
                     count, _rests(before, ledger.shaft_at(at) if here is None else here)
                 )
-            place = len(self.ledgers)
-            for out in self._outs.values():
+            place = len(self._ledgers)
+            for out in self._outgoing.outs.values():
                 count = moment.counts[place] + self._levels_in(batches, out)
                 levels[out.name], places[out.name] = out.levels.cut(count), count
                 place += 1
-            for number in range(len(self.lines)):
-                heard = self.cell.lines[number].take()
+            for number in range(len(self._outgoing.lines)):
+                heard = self._cell.lines[number].take()
                 counts.append(moment.counts[place] + len(heard))
                 place += 1
-            self._stores.cut()
+            self._outgoing.stores.cut()
             if event.dry:  # nothing is different from there on: what was armed is armed
-                met.append((at, self._cuts(stopped)))
+                met.append((at, self._outgoing.cuts(stopped)))
 
         met: list[tuple[Ns, dict[str, Level]]] = []  # what would stop it, from when on
 
         def lived() -> None:
-            self._take(self._batches(), tell=False)
-            inputs = self._cuts(stopped)
+            self._outgoing.take(self._outgoing.batches(), tell=False)
+            inputs = self._outgoing.cuts(stopped)
             if not met or inputs != met[-1][1]:
-                met.append((self.cell.now, inputs))
+                met.append((self._cell.now, inputs))
 
-        self._stores.count = [m for m in self.past.moments if m.now <= at][-1].counts[-1]
-        self.living_again = True  # inputs are armed anew only behind it
-        self.past.back(at, actions, drop, arrived, lived)
-        self.living_again = False
+        self._outgoing.stores.count = [m for m in self._past.moments if m.now <= at][-1].counts[-1]
+        self._outgoing.living_again = True  # inputs are armed anew only behind it
+        self._past.back(at, actions, drop, arrived, lived)
+        self._outgoing.living_again = False
         lived()
-        heard: list[list[Heard]] = [self.cell.lines[number].take() for number in range(len(self.lines))]
-        for line, count, new in zip(self.lines, counts[len(self.ledgers) :], heard, strict=True):
+        heard: list[list[Heard]] = [self._cell.lines[number].take() for number in range(len(self._outgoing.lines))]
+        for line, count, new in zip(self._outgoing.lines, counts[len(self._ledgers) :], heard, strict=True):
             for wrong, right in line.rewind(count, new):
                 self.escaped += 1
                 instead = "" if right is None else f"; it would be {right.char.value:#04x}"
                 what = f"a host heard {wrong.char.value:#04x} of {wrong.at / 1e9:.4f} s before a stop took it back"
-                self._say(Weight.WARNING, what + instead)
+                self._outgoing.say(Weight.WARNING, what + instead)
         self._tell_ledgers(stopped, event, motions, counts)
         if stopped.standing is Standing.DRIVEN:  # before any pulse leaves; those that came and went meanwhile, too
             for when, inputs in met:
                 stopped.guard.want(inputs, when, when)
-        self._arm()
-        self.commit()
-        for out in self._outs.values():
+        self._outgoing.arm()
+        self._outgoing.commit()
+        for out in self._outgoing.outs.values():
             self._tell_out(out, levels[out.name], out.levels.since(places[out.name]), at, stopped)
-        self._pending = True
+        self._outgoing.pending = True
 
     def _levels_in(self, batches: Sequence[Batch], out: Out) -> int:
         """How many items of the channel of an output these entries make."""
@@ -206,30 +187,30 @@ class Rollback(Outgoing):
                 continue
             for entry in entries:
                 if isinstance(entry, PinSet):
-                    count += self._outs.get((unit, entry.pin)) is out
+                    count += self._outgoing.outs.get((unit, entry.pin)) is out
                 elif isinstance(entry, Powered):
-                    enables = any(ledger.what.enable == out.name for ledger in self._of_unit.get(unit, ()))
+                    enables = any(ledger.what.enable == out.name for ledger in self._outgoing.of_unit(unit))
                     count += enables or not entry.on
         return count
 
     def _tell_ledgers(
         self, stopped: AxisLedger, event: Stopped, old: dict[str, list[Motion]], counts: Sequence[int]
     ) -> None:
-        now = self.cell.now
-        for ledger, count in zip(self.ledgers, counts, strict=False):
+        now = self._cell.now
+        for ledger, count in zip(self._ledgers, counts, strict=False):
             new = ledger.motions.since(count)
             if ledger.standing is not Standing.DRIVEN:
                 continue
             if ledger is not stopped:
                 if new != old[ledger.name] and ledger.guard.armed.get(event.input) == int(event.level):
                     stands = ledger.stepper.stands(self._wall())
-                    if stands is not None and not self.boards.stops[ledger.name].alive:
+                    if stands is not None and not self._boards.stops[ledger.name].alive:
                         ledger.guard.fired()  # it has yet to be armed, and no step has left: there is nothing to stop
                         self._tell_anew(ledger, stands, count, new)
                         continue
                     ledger.awaits = event.input, self._wall()
                     ledger.stepper.halt()
-                    self.boards.stops[ledger.name].now()  # what it was sent for later, when the input may be over
+                    self._boards.stops[ledger.name].now()  # what it was sent for later, when the input may be over
                     continue
                 lost = ledger.tell_difference(old[ledger.name], new, now)
                 if lost:
@@ -249,17 +230,17 @@ class Rollback(Outgoing):
     def _tell_out(
         self, out: Out, old: list[tuple[Ns, bool]], new: list[tuple[Ns, bool]], at: Ns, stopped: AxisLedger
     ) -> None:
-        mine = out.unit == self.cell.unit(stopped.what.unit)
+        mine = out.unit == self._cell.unit(stopped.what.unit)
         same = alike(old, new)
         if not mine and same == len(old):
             for when, level in new[same:]:
-                self._set(out, level, when)
+                self._outgoing.set(out, level, when)
             return
-        self.boards.outs[out.name].rewind(at)
+        self._boards.outs[out.name].rewind(at)
         for when, level in new:
-            self._set(out, level, when)
+            self._outgoing.set(out, level, when)
 
-    def _stopped_too(self, ledger: AxisLedger, event: Stopped) -> None:
+    def stopped_too(self, ledger: AxisLedger, event: Stopped) -> None:
         """What stopped another axis stopped this one at the same instant: the cell has been there already.
 
         The two are looked at one after the other, and one may be later than the other: some steps may be between.
@@ -267,47 +248,49 @@ class Rollback(Outgoing):
         waited, ledger.awaits = ledger.awaits, None
         ledger.guard.fired()
         ledger.stops += 1
-        motion, here = ledger.motion, ledger.shaft_at(self.cell.now)
+        motion, here = ledger.motion, ledger.shaft_at(self._cell.now)
         if motion is not None and event.shaft != motion.shaft:
             name = event.input or (waited[0] if waited else "an input")
-            self._fault(ledger, f"{name} has stopped it, and it moves on in the cell")
-            motion, here = None, ledger.shaft_at(self.cell.now)
+            self._faults.fault(ledger, f"{name} has stopped it, and it moves on in the cell")
+            motion, here = None, ledger.shaft_at(self._cell.now)
         if motion is None and event.shaft != here:
             if abs(event.shaft - here) > 1:
                 what = f"{event.shaft - here:+d} steps that had left when a stop was told are counted all the same"
-                self._say(Weight.WARNING, f"{ledger.name}: {what}")
-            self._place(ledger, event.shaft)
-            self.past.clear()  # nobody goes back to before that
-            self.past.keep()
+                self._outgoing.say(Weight.WARNING, f"{ledger.name}: {what}")
+            self._faults.place(ledger, event.shaft)
+            self._past.clear()  # nobody goes back to before that
+            self._past.keep()
         ledger.stepper.rewind(event.shaft)
         if motion is not None:
             ledger.stepper.tell(motion)
-        self._arm()
-        self._pending = True
+        self._outgoing.arm()
+        self._outgoing.pending = True
 
-    def _not_stopped(self) -> None:
+    def not_stopped(self) -> None:
         """An axis that should have been stopped as another was, and was not, has made what it was sent."""
-        for ledger in self.ledgers:
+        for ledger in self._ledgers:
             if ledger.awaits is None or ledger.standing is not Standing.DRIVEN:
                 continue
             name, since = ledger.awaits
-            if self._wall() - since > self.plan.lead + ledger.stepper.behind(self.cell.now) + AWAITED:
+            if self._wall() - since > self._plan.lead + ledger.stepper.behind(self._cell.now) + AWAITED:
                 ledger.awaits = None
-                self._fault(ledger, f"{name} has not stopped it as it stopped another axis")
-                self._place(ledger, ledger.stepper.shaft)
+                self._faults.fault(ledger, f"{name} has not stopped it as it stopped another axis")
+                self._faults.place(ledger, ledger.stepper.shaft)
 
     def _contradicted(self, ledger: AxisLedger, stopped: AxisLedger, lost: int) -> None:
         """Pulses left that the cell did not give after all: it is told where the motor is, and the axis stands."""
         if ledger.what.unit == stopped.what.unit and ledger.motion is None:  # it is ahead of the other, which slipped
             what = f"{lost} steps that had left when a late stop of {stopped.name} was told are counted all the same"
-            self._say(Weight.WARNING, f"{ledger.name}: {what}")
-            self._place(ledger, ledger.stepper.shaft)
-            self.past.clear()
-            self.past.keep()
+            self._outgoing.say(Weight.WARNING, f"{ledger.name}: {what}")
+            self._faults.place(ledger, ledger.stepper.shaft)
+            self._past.clear()
+            self._past.keep()
             return
         what = f"{lost} steps left the pins though a stop of {stopped.name} took them back"
-        self._fault(ledger, f"{what}: wires of the cell make it follow too closely; the counter says where it stands")
-        self._place(ledger, ledger.stepper.shaft)
+        self._faults.fault(
+            ledger, f"{what}: wires of the cell make it follow too closely; the counter says where it stands"
+        )
+        self._faults.place(ledger, ledger.stepper.shaft)
 
 
 def _rests(before: Sequence[Motion], shaft: int) -> int:
