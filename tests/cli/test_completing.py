@@ -10,55 +10,61 @@ from detent.cli import application, main
 from detent.cli.completing import KNOWN, with_choices
 from detent.controllers.catalogue import MODELS
 
+SHELLS = ("bash", "zsh", "fish")
 
-def test_models_motors_straps_options_verbs_and_examples_are_completed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    home = tmp_path / "home"
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the completion of each shell, `script.SHELL`, and the home of who made it."""
+    folder = tmp_path_factory.mktemp("completion")
+    home = folder / "home"
     home.mkdir()
     (home / ".bashrc").write_text("mine\n")
-    monkeypatch.setenv("HOME", str(home))
-    for shell in ("bash", "zsh", "fish"):
-        script = tmp_path / f"script.{shell}"
-        with pytest.raises(SystemExit) as ended:
-            main(["--install-completion", "--shell", shell, "--output", str(script)])
-        assert not ended.value.code, capsys.readouterr().err
-        text = script.read_text()
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("HOME", str(home))
+        for shell in SHELLS:
+            with pytest.raises(SystemExit) as ended:
+                main(["--install-completion", "--shell", shell, "--output", str(folder / f"script.{shell}")])
+            assert not ended.value.code
+    return folder
+
+
+def test_models_motors_straps_options_verbs_and_examples_are_completed(place: Path) -> None:
+    home = place / "home"
+    for shell in SHELLS:
+        text = (place / f"script.{shell}").read_text()
         for word in ("gs-c200s", "dcb-274", "qsh4218-41-10-035", "CHS=", "closed-loop-motor", "gs-c200-slew"):
             assert word in text, (shell, word)
         assert "no-checksum" in text
-    assert "fault" in (tmp_path / "script.fish").read_text()
+    assert "fault" in (place / "script.fish").read_text()
     assert (home / ".bashrc").read_text() == "mine\n"
     assert [path.name for path in home.iterdir()] == [".bashrc"]
 
 
-def test_straps_and_options_are_those_of_the_model_that_was_typed(tmp_path: Path) -> None:
-    script = tmp_path / "script"
-    with pytest.raises(SystemExit):
-        main(["--install-completion", "--shell", "bash", "--output", str(script)])
-
-    def completed(*words: str) -> list[str]:
-        typed = " ".join(f"'{word}'" for word in words)
-        line = f"source {script}; COMP_WORDS=(detent {typed}); COMP_CWORD={len(words)}; _detent; echo ${{COMPREPLY[@]}}"
-        return subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True).stdout.split()
-
+def test_straps_and_options_are_those_of_the_model_that_was_typed(place: Path) -> None:
+    expected: dict[tuple[str, ...], list[str]] = {("serve", "gs-c200", "--strap", "CH"): ["CHS="]}
     for verb in ("serve", "run", "workbench", "epics"):
         for name, model in MODELS.items():
-            assert completed(verb, name, "--strap", "") == [f"{strap}=" for strap in model.straps]
-            assert completed(verb, name, "--set", "") == [f"{option.name}=" for option in model.options]
-    every = {f"{strap}=" for model in MODELS.values() for strap in model.straps}
-    assert set(completed("run", "cell.toml", "--strap", "")) == every
-    assert completed("serve", "gs-c200", "--strap", "CH") == ["CHS="]
-    assert "qsh4218-41-10-035" in completed("tune", "gs-c200", "--motor", "qsh")
+            expected[verb, name, "--strap", ""] = [f"{strap}=" for strap in model.straps]
+            expected[verb, name, "--set", ""] = [f"{option.name}=" for option in model.options]
+    anything, motor = ("run", "cell.toml", "--strap", ""), ("tune", "gs-c200", "--motor", "qsh")
+    asked = [*expected, anything, motor]
+    lines = [f"source {place / 'script.bash'}"]
+    for words in asked:  # each in a shell of its own
+        typed = " ".join(f"'{word}'" for word in words)
+        lines.append(f"(COMP_WORDS=(detent {typed}); COMP_CWORD={len(words)}; _detent; echo ${{COMPREPLY[@]}})")
+    done = subprocess.run(["bash", "-c", "\n".join(lines)], capture_output=True, text=True, check=True)
+    found = dict(zip(asked, (line.split() for line in done.stdout.splitlines()), strict=True))
+    assert {words: found[words] for words in expected} == expected
+    assert set(found[anything]) == {f"{strap}=" for model in MODELS.values() for strap in model.straps}
+    assert "qsh4218-41-10-035" in found[motor]
 
 
 @pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_the_functions_of_the_other_shells_know_the_model(shell: str, tmp_path: Path) -> None:
+def test_the_functions_of_the_other_shells_know_the_model(shell: str, place: Path) -> None:
     if shutil.which(shell) is None:
         pytest.skip(f"{shell} is not installed")
-    script = tmp_path / "script"
-    with pytest.raises(SystemExit):
-        main(["--install-completion", "--shell", shell, "--output", str(script)])
+    script = place / f"script.{shell}"
     assert "@" not in [line for line in script.read_text().splitlines() if "_detent_strap" in line][-1]
     line = {
         "zsh": f"compdef() {{ }}; _arguments() {{ }}; . {script} 2>&-; print -l $(_detent_strap detent run dcb-274)",
@@ -72,13 +78,11 @@ OPTIONS = {"gs-c200": {"--address", "--no-checksum", "--revision"}, "supersigma"
            "dcb-274": {"--name", "--mode", "--first"}}  # fmt: skip
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_options_of_a_unit_are_those_of_the_model_that_was_typed(shell: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("shell", SHELLS)
+def test_options_of_a_unit_are_those_of_the_model_that_was_typed(shell: str, place: Path) -> None:
     if shutil.which(shell) is None:
         pytest.skip(f"{shell} is not installed")
-    script = tmp_path / "script"
-    with pytest.raises(SystemExit):
-        main(["--install-completion", "--shell", shell, "--output", str(script)])
+    script = place / f"script.{shell}"
     every = {flag for flags in OPTIONS.values() for flag in flags}
     for typed, expected in {**OPTIONS, "": every}.items():
         line = {

@@ -16,7 +16,7 @@ from detent.workbench.engine import BATCH
 from detent.workbench.messages import Happened, Opened
 from detent.workbench.mirror import Mirror
 
-TICK, SHIFT = 50 * MS, 60 * SECOND
+TICK, SHIFT = 50 * MS, 20 * SECOND
 """How finely a cell is told at the pace of real time, and one that runs as fast as it goes."""
 
 
@@ -29,7 +29,7 @@ def drilling() -> Told:
 CELLS: dict[str, tuple[Callable[[], Told], Action | None, Ns]] = {
     "a program": (drilling, None, 240 * SECOND),
     "a host that polls": (lambda: alone("gs-c200"), Type("gs-c200", "F"), 60 * SECOND),
-    "a host that polls a board": (lambda: alone("bs0610"), Type("bs0610", "?"), 60 * SECOND),
+    "a host that polls a board": (lambda: alone("bs0610"), Type("bs0610", "?"), 20 * SECOND),
 }
 
 
