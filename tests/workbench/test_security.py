@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import socket
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 from detent.workbench.drafts import LONGEST, Draft, Drafts
 from detent.workbench.folder import LARGEST, Folder, OutsideFolder
 from detent.workbench.guard import Guard, check_place, is_loopback
+from detent.workbench.listening import Listening
 
 TOKEN = "a word of my own"
 
@@ -143,6 +145,15 @@ def test_without_the_token_nothing_is_served(open_to_all: Guard) -> None:
     assert status(open_to_all, HERE, query="token=") == 401
     assert status(open_to_all, HERE, ("cookie", "detent=nothing; x")) == 401
     assert status(open_to_all, HERE, OWN, kind="websocket") == 1008
+
+
+@pytest.mark.parametrize("token", ["a word of my own", "100 % + 1 & 2 = 3", "where?now#here", "Schl\u00fcssel/1"])
+def test_the_address_that_is_printed_lets_in_whatever_the_token_is(token: str) -> None:
+    with socket.socket() as bound:
+        path, _, query = Listening(bound, "127.0.0.1", 8274).url(token).partition("?")
+    assert path == "http://127.0.0.1:8274/"
+    assert not set(query) & set(" #"), "as a terminal finds its end, and a browser"
+    assert Guard(everything, "127.0.0.1", token).check_token(query, [])
 
 
 def test_the_token_in_the_address_becomes_a_cookie_and_leaves_the_address(open_to_all: Guard) -> None:

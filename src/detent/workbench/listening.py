@@ -5,6 +5,7 @@ import errno
 import ipaddress
 import socket
 from typing import NamedTuple
+from urllib.parse import quote
 
 from detent.realtime.system import reuse_address
 
@@ -34,7 +35,7 @@ class Listening(NamedTuple):
         with contextlib.suppress(ValueError):
             if ipaddress.ip_address(named).version == 6:
                 named = f"[{named}]"
-        return f"http://{named}:{self.port}/{page}" + (f"?token={token}" if token else "")
+        return f"http://{named}:{self.port}/{page}" + (f"?token={quote(token, safe='')}" if token else "")
 
 
 def listen_as_usual(host: str, token: str | None) -> Listening:
