@@ -34,9 +34,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         item.add_marker(pytest.mark.xdist_group(f"browser {files.index(item.path) % 2}"))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def chromium() -> Iterator[Any]:
-    """The browser. While it is open this thread counts as one with an event loop: other modules need it without."""
+    """The browser. While it is open this thread counts as one with an event loop: other folders need it without."""
     if CHROMIUM is None:
         pytest.skip("no chromium on this machine")
     with sync_api.sync_playwright() as playwright:
@@ -93,16 +93,25 @@ def bench(chromium: object, serve: Callable[..., Served], real: str) -> Served:
     return serve("dcb-274", real, "--patience", "10")  # a loaded computer pauses between two characters
 
 
+@pytest.fixture(scope="package")
+def browser(chromium: Any) -> Callable[[], Windows]:
+    """Windows of tests that share the profiles of the browser, and their tabs."""
+    profiles: dict[object, Any] = {}
+    tabs: dict[object, list[Any]] = {}
+    return lambda: Windows(chromium, profiles, tabs)
+
+
 @pytest.fixture(scope="module")
-def profiles() -> dict[object, Any]:
-    """The profiles of the browser that windows share."""
-    return {}
+def resting(browser: Callable[[], Windows]) -> Iterator[None]:
+    """When the tests of a file are done nothing of theirs is drawn on."""
+    yield
+    browser().rest()
 
 
 @pytest.fixture
-def windows(chromium: Any, profiles: dict[object, Any]) -> Iterator[Windows]:
+def windows(browser: Callable[[], Windows], resting: None) -> Iterator[Windows]:
     """Windows of this test; at its end none of them may have asked another host, or raised an error."""
-    opened = Windows(chromium, profiles)
+    opened = browser()
     yield opened
     found = opened.close()
     assert found == [([], [])] * len(found)

@@ -65,8 +65,7 @@ def test_no_page_has_a_serious_finding_in_any_size_or_theme(path: str, windows: 
         assert window.page.evaluate("document.documentElement.scrollWidth") <= size[0], (
             f"{size[0]}: wider than the window"
         )
-        window.page.close()
-        windows.opened.remove(window)
+        windows.done(window)
     assert not found, json.dumps(found, indent=1)
 
 
@@ -91,8 +90,7 @@ def test_no_type_is_too_small_to_read(path: str, windows: Windows, workbench: Se
     assert window.page.evaluate(TYPE, LEAST_TYPE) == []
     window.page.set_viewport_size({"width": 1280, "height": 800})
     assert window.page.evaluate(TYPE, LEAST_TYPE) == []
-    window.page.close()
-    windows.opened.remove(window)
+    windows.done(window)
 
 
 CONTRAST = """() => {
@@ -124,8 +122,7 @@ def test_every_ink_stands_out_from_what_it_is_written_on(theme: str, windows: Wi
     window = windows.new(workbench, theme=theme).open()
     low = [one for one in window.page.evaluate(CONTRAST) if one[2] < LEAST_CONTRAST]
     assert low == []
-    window.page.close()
-    windows.opened.remove(window)
+    windows.done(window)
 
 
 def test_every_page_is_reached_and_left_by_the_keyboard_alone(window: Window) -> None:

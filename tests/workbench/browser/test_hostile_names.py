@@ -37,6 +37,7 @@ def hostile(chromium: Any, serve: Callable[..., Served], tmp_path_factory: pytes
 
 def test_no_name_title_comment_or_answer_becomes_a_part_of_a_page(windows: Windows, hostile: Served) -> None:
     window = windows.new(hostile)
+    window.own = True
     window.page.add_init_script("window.hits = 0; window.hit = () => { window.hits += 1 }")
     for path in PAGES:
         window.open(path)

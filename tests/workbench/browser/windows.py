@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from tests.workbench.patience import PATIENCE
 
 COMMAND = [sys.executable, "-c", "from detent.cli import main; main()", "workbench"]
+NOTHING = "silence.js"  # a small file of the workbench; shown, it is a text
 WIDE, PHONE = (1280, 800), (390, 844)
 THEMES = ("light", "dark")
 PICTURES = os.environ.get("DETENT_PICTURES")
@@ -64,16 +65,23 @@ class Window:
 
     def __init__(self, page: Any, url: str) -> None:
         self.page, self.url = page, url
-        self.kept = False  # for the next test
+        self.kept = False  # for the next test, at the page where it is
+        self.shows = False  # a page of the workbench
+        self.own = False  # the test has changed what stays with its tab
         self.process = 0  # the workbench, for who wants to know it
         self.errors: list[str] = []
         self.requests: list[str] = []
-        page.on("pageerror", lambda error: self.errors.append(str(error)))
-        page.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
-        page.on("request", lambda request: self.requests.append(request.url))
+        self._heard = {
+            "pageerror": lambda error: self.errors.append(str(error)),
+            "console": lambda message: self.errors.append(message.text) if message.type == "error" else None,
+            "request": lambda request: self.requests.append(request.url),
+        }
+        for event, hear in self._heard.items():
+            page.on(event, hear)
 
     def open(self, path: str = "/") -> "Window":
         """Load a page and wait until it shows live values."""
+        self.shows = True
         base, _, token = self.url.partition("?")
         self.page.goto(base.rstrip("/") + path + ("&" if "?" in path else "?") + token)
         self.page.wait_for_function("window.detent && detent.get('now') !== undefined")
@@ -103,6 +111,23 @@ class Window:
             session.send("Input.dispatchKeyEvent", {"type": kind, **key})
         session.detach()
 
+    def leave(self) -> bool:
+        """Lead the tab to a file that does nothing, where nothing is remembered; False: it cannot be used again."""
+        from playwright.sync_api import Error
+
+        for event, hear in self._heard.items():
+            self.page.remove_listener(event, hear)
+        if self.own or self.errors or not self.page.url.startswith("http"):
+            return False
+        try:
+            answer = self.page.goto("/".join([*self.url.split("/")[:3], "assets", NOTHING]))
+        except Error:  # the workbench is gone
+            return False
+        if answer is None or not answer.ok:
+            return False
+        self.page.evaluate("localStorage.clear(), sessionStorage.clear()")
+        return True
+
     def foreign(self) -> list[str]:
         """Requests to other places than the workbench."""
         own = self.url.split("/")[2]
@@ -122,16 +147,17 @@ class Window:
 class Windows:
     """Opens windows of one workbench, and looks at them when the test is over.
 
-    Windows of one size and theme share a profile of the browser, so that it loads what never changes once.
+    Windows of one size and theme share a profile of the browser, so that it loads what never changes once, and one
+    after the other its tabs: to open one costs as much as three pages.
     """
 
-    def __init__(self, chromium: Any, profiles: dict[object, Any]) -> None:
-        self._chromium, self._profiles = chromium, profiles
+    def __init__(self, chromium: Any, profiles: dict[object, Any], tabs: dict[object, list[Any]]) -> None:
+        self._chromium, self._profiles, self._tabs = chromium, profiles, tabs
         self.opened: list[Window] = []
 
     def new(self, served: Served, *, size: tuple[int, int] = WIDE, theme: str = "light", tour: bool = False) -> Window:
         """A window, not yet at a page."""
-        window = Window(self._profile(size, theme, tour).new_page(), served.url)
+        window = Window(self._tab(size, theme, tour), served.url)
         self.opened.append(window)
         return window
 
@@ -139,24 +165,55 @@ class Windows:
         """The window that tests use one after the other, at the page where the last one left it."""
         kept = ("usual", served.url)
         if kept not in self._profiles:
-            self._profiles[kept] = Window(self._profile(WIDE, "light", False).new_page(), served.url)
+            self._profiles[kept] = Window(self._tab(WIDE, "light", False), served.url)
         window: Window = self._profiles[kept]
         window.kept = True
+        window.page.bring_to_front()  # the page of a tab that is behind another is drawn rarely
         self.opened.append(window)
         return window
+
+    def done(self, window: Window) -> None:
+        """The test needs it no longer."""
+        self.opened.remove(window)
+        self._leave(window)
 
     def close(self) -> list[tuple[list[str], list[str]]]:
         """Close all of them but the usual one; what each asked of other hosts, and its errors."""
         found = [(window.foreign(), list(window.errors)) for window in self.opened]
         for window in self.opened:
-            if window.page.url.startswith("http"):
-                window.page.evaluate("localStorage.clear()")
             if window.kept and not window.errors:
+                window.page.evaluate("localStorage.clear()")
                 window.requests.clear()
             else:
-                window.page.close()
-                self._profiles.pop(("usual", window.url), None)
+                self._leave(window)
         return found
+
+    def rest(self) -> None:
+        """Leave the usual ones, whose pages draw; the cell of each stands."""
+        for kept in [kept for kept, window in self._profiles.items() if isinstance(window, Window)]:
+            self._profiles[kept].call("hold")
+            self._leave(self._profiles[kept])
+
+    def _leave(self, window: Window) -> None:
+        if window.kept:
+            del self._profiles["usual", window.url]
+        kind = next(kind for kind, profile in self._profiles.items() if profile is window.page.context)
+        if window.leave():
+            self._tabs.setdefault(kind, []).append(window.page)
+        else:
+            window.page.close()
+
+    def _tab(self, size: tuple[int, int], theme: str, tour: bool) -> Any:
+        """A tab that a test before has left, or a new one."""
+        kind = (size, theme, tour)
+        profile = self._profile(size, theme, tour)
+        if not self._tabs.get(kind):
+            return profile.new_page()
+        tab = self._tabs[kind].pop()
+        tab.bring_to_front()
+        if tab.viewport_size != (there := {"width": size[0], "height": size[1]}):
+            tab.set_viewport_size(there)
+        return tab
 
     def _profile(self, size: tuple[int, int], theme: str, tour: bool) -> Any:
         kind = (size, theme, tour)
@@ -174,7 +231,7 @@ class Windows:
 
 def begun(window: Window) -> Window:
     """The window at the page Cell, its cell begun anew and running in real time."""
-    if window.page.url == "about:blank":
+    if not window.shows:
         window.open()
     else:
         window.page.get_by_role("link", name="Cell", exact=True).click()
