@@ -8,7 +8,6 @@ import pytest
 from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench, pulses
 
-from detent.realtime.boards.events import DriverFault
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.states import Standing, Weight
 from detent.ticks import MS, SECOND, US, Ns
@@ -464,18 +463,6 @@ def test_a_host_that_dies_leaves_a_motor_that_stands_and_outputs_at_rest(enable:
         assert port.board.reason is not None
 
 
-def test_a_plain_driver_is_not_left_with_all_its_current_when_the_host_dies() -> None:
-    text = CELL.replace('enable = "!gpio4"', 'driver = { kind = "plain", half = "gpio9" }')
-    with Bench(text) as bench:
-        bench.run(100 * MS)
-        bench.type("x", "+4000")
-        bench.run(300 * MS)
-        assert levels(bench, "gpio9")[-1][1] is False
-        bench.stall(5 * SECOND)
-        bench.ports["b"].run_to(bench.wall)
-        assert levels(bench, "gpio9")[-1][1] is True
-
-
 @pytest.mark.parametrize("power", [False, True])
 def test_closing_switches_the_drivers_off(power: bool) -> None:
     with Bench(CELL) as bench:
@@ -551,46 +538,6 @@ def test_a_cell_that_cannot_go_on_stops_its_boards() -> None:
         place = bench.position("x")
         bench.run(1 * SECOND)
         assert bench.position("x") == place
-
-
-def test_a_driver_that_does_not_answer_is_a_fault_of_its_axis() -> None:
-    """A DCB-274 commands amperes; the chip that should take them is not there."""
-    text = DCB + 'driver = { kind = "tmc2209", uart = "gpio20", sense = 0.05 }\n'
-    with Bench(text) as bench:
-        bench.run(3 * SECOND)
-        state = bench.driven.axes()[0]
-        assert state.standing is Standing.FAULT
-        assert "its driver: " in state.why
-
-
-def test_a_plain_driver_gets_half_of_its_current_at_rest() -> None:
-    text = CELL.replace('enable = "!gpio4"', 'enable = "!gpio4"\ndriver = { kind = "plain", half = "gpio20" }')
-    with Bench(text) as bench:
-        bench.run(300 * MS)
-        bench.type("x", "+100")
-        bench.rest()
-        (full, first), (half, second) = levels(bench, "gpio20")[-2:]
-        assert (first, second) == (False, True)
-        edges = [bench.boards.boards["b"].core.scale.time(tick) for tick, _ in bench.edges("x")]
-        assert full < edges[0]
-        assert half > edges[-1]
-
-
-def test_a_driver_that_fails_in_mid_move_stops_its_axis() -> None:
-    with Bench(CELL) as bench:
-        bench.run(100 * MS)
-        bench.driven.ledgers[0].what = bench.driven.ledgers[0].what._replace(driver="x.driver")
-        bench.type("x", "g-")
-        bench.run(500 * MS)
-        before = bench.position("x")
-        bench.boards.master.core.events.append(DriverFault("b", "x.driver", "it is too hot"))
-        bench.run(1 * SECOND)
-        after = bench.position("x")
-        assert before - 1000 * (LEAD + 5 * MS) // SECOND <= after <= before
-        state = bench.driven.axes()[0]
-        assert state.standing is Standing.FAULT
-        assert state.shaft == after
-        assert "too hot" in state.why
 
 
 def test_an_input_that_gates_single_pulses_is_refused_when_it_shows() -> None:
