@@ -2,7 +2,7 @@
 
 What a stop watches for is told by the stop, exactly: its report is kept back until nothing is armed for it any more. A
 stop comes into force with the pulses that it guards, a lead after the cell began them. An input that comes and goes in
-between is told as any other.
+between is told as any other (decision 49).
 """
 
 from collections.abc import Callable, Mapping, Sequence
