@@ -5,10 +5,12 @@ Nothing here waits for a time: each test waits for what the engine tells.
 
 import asyncio
 import os
+import re
 import select
 import signal
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +28,17 @@ from detent.workbench.scope import Trigger
 DRILLING = str(Path(__file__).parents[2] / "examples" / "drilling" / "cell.toml")
 
 LOOP = "S50\nL0\nA1\n+20\nC1\nD1\nL200\n"  # addresses 0 4 6 8 12 14 16
+
+
+TYPES = Path(__file__).parent / "scripts" / "page.d.ts"
+KINDS: dict[str, Any] = {"number": int | float, "number | null": int | float | None, "boolean": bool, "string": str,
+                         "[number, string][]": list}  # fmt: skip
+
+
+def live_keys() -> list[tuple[str, str]]:
+    """What the scripts know of the live table, each with its type."""
+    (live,) = re.findall(r"^interface Live \{$(.*?)^\}$", TYPES.read_text(), re.MULTILINE | re.DOTALL)
+    return re.findall(r"^  (\w+): (.+);$", live, re.MULTILINE)
 
 
 def play(scene: Callable[[Bench], Awaitable[None]], target: str = DRILLING, **options: object) -> None:
@@ -380,7 +393,9 @@ def test_as_fast_as_it_goes_time_stands_while_nothing_is_due_and_says_so() -> No
         assert not bench.state.idle
         await bench.pace(None)
         stood = await bench.until(lambda state: state.idle)
-        assert table(stood)["why"] == "nothing is due: at max, time stands until something is"
+        told = table(stood)
+        assert {key: kind for key, kind in live_keys() if not isinstance(told[key], KINDS[kind])} == {}
+        assert told["why"] == "nothing is due: at max, time stands until something is"
         await bench.type(unit, "+1000")
         state = await bench.until(lambda state: state.idle and state.units[unit].axes[""].position == 1000)
         assert state.now > stood.now

@@ -30,6 +30,7 @@ WRONG = {
     'detent.call("holt");': "'\"holt\"' is not assignable to parameter of type 'keyof Calls'",
     'detent.call("power", "bar");': "Expected 3 arguments",
     'detent.call("places").then((found) => found.modles);': "Property 'modles' does not exist on type 'Places'",
+    'detent.get("held").length;': "Property 'length' does not exist on type 'boolean'",
     'detent.talk("x");': "Property 'talk' does not exist",
     'import { grouped } from "./forms.js";\ngrouped("7");': "not assignable to parameter of type 'number'",
     "const { missing } = window.detent;": "Property 'missing' does not exist",

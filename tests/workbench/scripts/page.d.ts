@@ -19,12 +19,33 @@ type Part = {
   [name: string]: any;
 } & HTMLElement;
 
+/** What the live table has of the cell itself (`detent.workbench.board`); of its parts, keys like `u.NAME.state`. */
+interface Live {
+  /** Cell time in ns: the present of what is shown, and from where to where it may be gone to. */
+  now: number;
+  begin: number;
+  end: number;
+  /** Cell time by real time; null: as fast as it goes. */
+  pace: number | null;
+  held: boolean;
+  /** Why it stands. */
+  why: string;
+  past: boolean;
+  faster: number;
+  late: number;
+  dropped: number;
+  breakerrors: boolean;
+  /** The numbers of what stands broken, with words. */
+  faults: [number, string][];
+}
+
 interface Detent {
   /** Set up every element with `data-part="NAME"`, as it comes; what `setup` gives back is called when it is gone. */
   part(name: string, setup: Setup): void;
   on(prefix: string, heard: Heard): End;
   /** Called after each change of the live table. */
   frame(drawn: () => void): End;
+  get<Key extends keyof Live>(key: Key): Live[Key];
   get(key: string): any;
   keys(): Iterable<string>;
   /** Make a call to the process of the pages. Throws what it says is wrong. */

@@ -513,7 +513,7 @@ window.detent = {
   underWay: (key) => meanings.underWay(key),
   make: (key, value, going) => meanings.make(key, value, going),
   turning: () => meanings.any,
-  get: (key) => values.get(key),
+  get: (/** @type {string} */ key) => values.get(key),
   keys: () => values.keys(),
   forms: FORMS,
 };
