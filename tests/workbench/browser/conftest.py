@@ -34,9 +34,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         item.add_marker(pytest.mark.xdist_group(f"browser {files.index(item.path) % 2}"))
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
-    """The browser. While it is open this thread counts as one with an event loop: other folders need it without."""
+    """The browser. While it is open this thread counts as one with an event loop: other modules need it without."""
     if CHROMIUM is None:
         pytest.skip("no chromium on this machine")
     with sync_api.sync_playwright() as playwright:
@@ -93,7 +93,7 @@ def bench(chromium: object, serve: Callable[..., Served], real: str) -> Served:
     return serve("dcb-274", real, "--patience", "10")  # a loaded computer pauses between two characters
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def browser(chromium: Any) -> Callable[[], Windows]:
     """Windows of tests that share the profiles of the browser, and their tabs."""
     profiles: dict[object, Any] = {}
