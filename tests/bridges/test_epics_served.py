@@ -283,6 +283,36 @@ print(json.dumps({"RBV": float(read("SIM:m1.RBV", repeater=False).data[0])}))
         assert service.cell.controller("gs-c200s").status(service.cell.now).position == -25
 
 
+@pytest.mark.parametrize("text", ["99999", "0", "abc", "-1", "", "9" * 5000, "\u0661"])
+def test_a_port_of_the_environment_that_is_none_is_refused_in_a_line(
+    text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("EPICS_CA_SERVER_PORT", text)
+    code, err = said(capsys, "gs-c200s", "--interfaces", "127.0.0.1")
+    assert code == 2
+    assert "$EPICS_CA_SERVER_PORT" in err
+    assert len(err) < 200
+
+
+def test_the_clients_that_are_named_look_where_the_records_are_found(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of two servers with one port the second has its connections elsewhere; searches still go to the one."""
+    monkeypatch.setenv("EPICS_CA_SERVER_PORT", "5064")  # and taken back, whatever the verb makes of it
+
+    async def ready_at_once(motors: object, interfaces: object, ready: Callable[[int], None], report: object) -> None:
+        ready(50_000)
+
+    monkeypatch.setattr("detent.bridges.epics.ioc.serve", ready_at_once)
+    with pytest.raises(SystemExit):
+        main(["epics", "gs-c200s", "--interfaces", "127.0.0.1", "--ca-port", "18777"])
+    told = capsys.readouterr().out
+    assert "port 18777:" in told
+    assert "EPICS_CA_SERVER_PORT=18777 caget SIM:m1.RBV" in told
+    assert "connections go to 50000" in told
+    assert "CA_SERVER_PORT=50000" not in told
+
+
 def said(capsys: pytest.CaptureFixture[str], *choices: str) -> tuple[object, str]:
     with pytest.raises(SystemExit) as ended:
         main(["epics", *choices])

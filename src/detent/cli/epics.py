@@ -24,6 +24,7 @@ _SETTINGS = {
 }  # fmt: skip
 """The options that say how a record begins, and what `Settings` calls them."""
 
+USUAL_PORT = 5064  # of Channel Access
 PREFIX = r"[A-Za-z0-9_:+\[\]<>;-]{0,50}"  # of a record's name, which has 60 characters at most
 
 Each = Annotated[Sequence[str], Parameter(negative=())]
@@ -129,6 +130,7 @@ def epics(
             if not 0 < ca_port < 65536:
                 raise Problem("", "--ca-port", f"{ca_port} is no port; it takes 1 to 65535")
             os.environ["EPICS_CA_SERVER_PORT"] = str(ca_port)
+        search = _search_port()
         if not list_pvs:
             need("epics", "EPICS records need")
         with _axes(target, port, unit, given, pace=pace, line_timing=line_timing, strap=strap, options=set_) as axes:
@@ -136,7 +138,7 @@ def epics(
                 _print_names(prefix, axes, json=json)
                 return
             known = bool(interfaces or os.environ.get("EPICS_CAS_INTF_ADDR_LIST"))
-            ready = _ready(prefix, axes, json=json, everywhere=not known)
+            ready = _ready(prefix, axes, search, json=json, everywhere=not known)
             asyncio.run(_serve(prefix, axes, interfaces, ready, quiet=json))
     except (Problem, MissingExtra, ValueError) as error:
         asked_wrongly(error)
@@ -312,8 +314,20 @@ def _somewhere(settings: "Settings") -> str:
     return repr(high)
 
 
-def _ready(prefix: str, axes: Sequence[RecordSetup], *, json: bool, everywhere: bool) -> Callable[[int], None]:
-    """What tells people, or a program, that clients can connect."""
+def _search_port() -> int:
+    """Where clients look for records. Raises Problem."""
+    from detent.cell.description import Problem
+
+    text = os.environ.get("EPICS_CA_SERVER_PORT", str(USUAL_PORT)).strip()
+    if not re.fullmatch("[0-9]{1,5}", text) or not 0 < int(text) < 65536:
+        raise Problem("", "$EPICS_CA_SERVER_PORT", f"{text[:40]!r} is no port; it takes 1 to 65535")
+    return int(text)
+
+
+def _ready(
+    prefix: str, axes: Sequence[RecordSetup], search: int, *, json: bool, everywhere: bool
+) -> Callable[[int], None]:
+    """What tells people, or a program, that clients can connect; they look for records at the port `search`."""
     names = [f"{prefix}{axis.record}" for axis in axes]
 
     def tell(port: int) -> None:
@@ -322,17 +336,22 @@ def _ready(prefix: str, axes: Sequence[RecordSetup], *, json: bool, everywhere: 
                       zip(names, axes, strict=True)]  # fmt: skip
             print(json_text.dumps({"port": port, "motors": motors}), flush=True)
             return
-        print(f"Motor records by Channel Access, port {port}:")
+        print(f"Motor records by Channel Access, port {search}:")
         width = max(map(len, names))
         for name, axis in zip(names, axes, strict=True):
             made = axis.settings
             limits = f", from {made.low:g} to {made.high:g}" if made.low or made.high else ", no soft limits"
             step = f"{made.resolution:g} {made.egu}".strip()
             print(f"  {name:{width}}  {axis.title}: {step} a step{limits}")
-        there = "" if port == 5064 else f"EPICS_CA_SERVER_PORT={port} "
+        there = "" if search == USUAL_PORT else f"EPICS_CA_SERVER_PORT={search} "
         print("Try:")
         print(f"  {there}caget {names[0]}.RBV")
         print(f"  {there}caput -c -w 60 {names[0]} {_somewhere(axes[0].settings)}")
+        if port != search:
+            print(
+                f"Another server has port {search}, too: connections go to {port}. Who looks for records at one address"
+            )
+            print("hears one of the two: give this one another --ca-port where its records are not found.")
         if everywhere:
             print("All who reach this computer can move these axes; --interfaces 127.0.0.1 keeps it to this computer.")
         print("Ctrl-C ends it.", flush=True)
