@@ -215,6 +215,25 @@ def test_a_hand_on_any_input_of_the_unit_stops_it(pin: str) -> None:
     assert out.made == len(bench.machine.steps) <= 31
 
 
+@pytest.mark.parametrize("pin", ["gpio10", "gpio12"])
+def test_a_touch_that_is_over_before_the_first_step_stops_it_too(pin: str) -> None:
+    """What stops it comes into force with the first step, a lead after the jog began."""
+    bench = Bench()
+    began: list[Ns] = []
+
+    def hand() -> bool:
+        began.append(bench.wall.now)
+        since = bench.wall.now - began[0]
+        level = bench.machine.level(pin)
+        if not bench.machine.steps and level is (since < 10 * MS):
+            bench.press(pin, not level)
+        return False
+
+    out = next(bench.check.jog(bench.axis, 100, 200, hand))
+    assert (out.made, len(bench.machine.steps)) == (0, 0)
+    assert out.why == ("x.EOT changed to 0" if pin == "gpio10" else "x.UI1 changed to 1")
+
+
 def test_stopped_by_hand_every_board_is_shut_down_at_once() -> None:
     bench = Bench()
     with pytest.raises(Trouble, match="stopped by hand"):

@@ -134,6 +134,12 @@ def test_what_befalls_a_board_is_told_and_leaves_the_other_alone() -> None:
     assert sum(session(seed) for seed in seeds(8)) > 1
 
 
+@pytest.mark.parametrize("seed", [261, 325])
+def test_an_axis_that_is_late_as_the_board_of_another_goes_away_goes_on(seed: int) -> None:
+    """What is at fault bars the way back for its own axis alone."""
+    session(seed)
+
+
 @pytest.mark.slow
 def test_what_befalls_a_board_is_told_and_leaves_the_other_alone_in_many_sessions() -> None:
     assert sum(session(seed) for seed in range(100, 400)) > 300

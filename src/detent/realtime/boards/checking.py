@@ -188,7 +188,7 @@ class Check:
             stepper.tell(entry)
         end = wall() + (steps * SECOND) // rate + self.plan.lead + PATIENCE
         met: list[Met] = []
-        why = ""
+        why, touched = "", ""
         ending: Ns | None = None  # a stop on the last step is heard of later
         while ending is None or wall() < ending:
             if aborted():
@@ -196,6 +196,10 @@ class Check:
             for event in self._turn(5 * MS):
                 gone = train.steps_by(boards.cell_at(wall()) - self.plan.lead)
                 met.append(Met(event.input, int(event.level), gone))
+                if guards.get(event.input) is event.level:
+                    touched = touched or event.input
+            if touched and not why and boards.stops[axis.stepper].alive:  # it came and went before the first step
+                boards.stops[axis.stepper].now()
             for heard in self._heard:
                 if isinstance(heard, Stopped) and heard.stepper == axis.stepper and heard.dry:
                     stepper.rewind(heard.shaft, slipped=True)  # they were late, and come later
@@ -203,11 +207,12 @@ class Check:
                     for entry in motion:
                         stepper.tell(entry)
                 elif isinstance(heard, Stopped) and heard.stepper == axis.stepper:
-                    made = abs(heard.shaft - began)
-                    met = [one for one in met if one.input != heard.input]  # this is where it was, exactly
-                    met.append(Met(heard.input, int(heard.level), made))
+                    made, name = abs(heard.shaft - began), heard.input or touched
+                    level = int(heard.level if heard.input else guards[touched])
+                    met = [one for one in met if one.input != name]  # this is where it was, exactly
+                    met.append(Met(name, level, made))
                     stepper.rewind(heard.shaft)
-                    why = f"{heard.input} changed to {int(heard.level)}"
+                    why = f"{name} changed to {level}"
                 elif isinstance(heard, CountDiffers):
                     raise Trouble(
                         f"{axis.stepper}: the board has counted {heard.counted} where {heard.shaft} were sent"

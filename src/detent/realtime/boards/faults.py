@@ -44,7 +44,7 @@ class Faults:
         self._outgoing.absorb()  # the stepper is told, while it still is
         ledger.standing, ledger.why, ledger.known = Standing.FAULT, why, known and not ledger.lost
         ledger.guard.want({}, self._cell.now, self._cell.now)  # what has left is watched until it is over
-        self._past.clear()
+        ledger.barred = self._cell.now
         if first:
             self._outgoing.say(Weight.FAULT, f"{ledger.name} stands: {why}; look at the machine, then recover")
 
@@ -53,8 +53,8 @@ class Faults:
         by = shaft - ledger.shaft_at(self._cell.now)
         if by:
             self._cell.displace(ledger.what.unit, ledger.what.axis, by)
-            ledger.displace(by)
             self._outgoing.absorb()
+        ledger.barred = self._cell.now
 
     def stop(self) -> None:
         """Emergency stop: every board stops at once, and every axis stands until `recover`."""
@@ -121,6 +121,7 @@ class Faults:
 
     def _driven_again(self, ledger: AxisLedger) -> None:
         ledger.guard.release()
+        ledger.barred = self._cell.now
         ledger.standing, ledger.why, ledger.known, ledger.awaits = Standing.DRIVEN, "", not ledger.lost, None
         unit = self._cell.unit(ledger.what.unit)
         for out in self._outgoing.outs.values():

@@ -6,7 +6,7 @@ that would cut it.
 
 from collections.abc import Callable, Mapping, Sequence
 
-from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.axis import Displaced, MotionCut, MotionEnded, MotionStarted
 from detent.cell.cell import Cell
 from detent.cell.recording import Batch
 from detent.controllers.device import DriveSet, Powered, StageSet
@@ -133,6 +133,11 @@ class Outgoing:
         if not changed:
             return
         self.pending = True
+        self.hold()
+        self.arm()
+
+    def hold(self) -> None:
+        """No axis at fault moves: its unit is halted."""
         at_fault = {
             ledger.what.unit
             for ledger in self.ledgers
@@ -142,7 +147,6 @@ class Outgoing:
             self.cell.halt(unit)
         if at_fault:
             self.take(self.batches(), tell=True)
-        self.arm()
 
     def batches(self) -> Sequence[Batch]:
         """What the cell has recorded since the last call."""
@@ -162,6 +166,10 @@ class Outgoing:
                             found = True
                             if tell and ledger.standing is not Standing.FAULT:
                                 ledger.stepper.tell(entry)
+                elif isinstance(entry, Displaced):
+                    for ledger in ledgers or ():
+                        if ledger.what.axis == entry.axis:
+                            ledger.displace(entry.shaft - ledger.shaft_at(entry.at))
                 elif isinstance(entry, PinSet):
                     if (unit, entry.pin) in self.outs:
                         self._level(unit, entry.pin, bool(entry.level), entry.at, tell=tell)

@@ -52,7 +52,7 @@ class Rollback:
         self.rewinds += 1
         at = min(ledger.instant_of(event.shaft, event.at), self._cell.now)
         if self._past.moments:
-            at = max(at, self._past.moments[0].now)
+            at = max(at, ledger.barred, self._past.moments[0].now)
         if not self._past.reaches(at) or ledger.place_at(at) != event.shaft:
             self._faults.fault(ledger, f"{event.input} has stopped it at {event.shaft}, and nobody knows when that was")
             self._faults.place(ledger, event.shaft)
@@ -80,7 +80,8 @@ class Rollback:
         at = min(min(found, key=lambda pair: abs(pair[0] - pair[1]))[0], self._cell.now)
         guarded = ledger.guard.watched(at)
         ledger.guard.fired()
-        if ledger.place_at(at) != event.shaft or (guarded and not self._past.reaches(at)):
+        known = at >= ledger.barred and self._past.reaches(at)
+        if ledger.place_at(at) != event.shaft or (guarded and not known):
             self._faults.fault(ledger, f"it was late, and stands at {event.shaft}: nobody knows when that was")
             self._faults.place(ledger, event.shaft)
             return
@@ -111,6 +112,8 @@ class Rollback:
     ) -> None:
         """The cell lives on from `at`, where `actions` are done; tell the boards only what is different."""
         self.on_taken_back(at)
+        at_fault = [ledger for ledger in self._ledgers if ledger.standing is Standing.FAULT]
+        stood = [ledger.shaft_at(self._cell.now) for ledger in at_fault]
         motions: dict[str, list[Motion]] = {}
         levels: dict[str, list[tuple[Ns, bool]]] = {}
         counts: list[int] = []
@@ -170,6 +173,9 @@ class Rollback:
                 what = f"a host heard {wrong.char.value:#04x} of {wrong.at / 1e9:.4f} s before a stop took it back"
                 self._outgoing.say(Weight.WARNING, what + instead)
         self._tell_ledgers(stopped, event, motions, counts)
+        self._outgoing.hold()
+        for ledger, shaft in zip(at_fault, stood, strict=True):
+            self._faults.place(ledger, shaft)  # whatever the cell had it do: no motor did
         if stopped.standing is Standing.DRIVEN:  # before any pulse leaves; those that came and went meanwhile, too
             for when, inputs in met:
                 stopped.guard.want(inputs, when, when)
@@ -258,8 +264,6 @@ class Rollback:
                 what = f"{event.shaft - here:+d} steps that had left when a stop was told are counted all the same"
                 self._outgoing.say(Weight.WARNING, f"{ledger.name}: {what}")
             self._faults.place(ledger, event.shaft)
-            self._past.clear()  # nobody goes back to before that
-            self._past.keep()
         ledger.stepper.rewind(event.shaft)
         if motion is not None:
             ledger.stepper.tell(motion)
@@ -283,8 +287,6 @@ class Rollback:
             what = f"{lost} steps that had left when a late stop of {stopped.name} was told are counted all the same"
             self._outgoing.say(Weight.WARNING, f"{ledger.name}: {what}")
             self._faults.place(ledger, ledger.stepper.shaft)
-            self._past.clear()
-            self._past.keep()
             return
         what = f"{lost} steps left the pins though a stop of {stopped.name} took them back"
         self._faults.fault(
