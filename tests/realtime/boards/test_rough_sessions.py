@@ -134,10 +134,42 @@ def test_what_befalls_a_board_is_told_and_leaves_the_other_alone() -> None:
     assert sum(session(seed) for seed in seeds(8)) > 1
 
 
-@pytest.mark.parametrize("seed", [261, 325])
-def test_an_axis_that_is_late_as_the_board_of_another_goes_away_goes_on(seed: int) -> None:
-    """What is at fault bars the way back for its own axis alone."""
-    session(seed)
+def neighbour(seed: int) -> None:
+    """A board goes away while an axis on another moves, and is late, or meets its switch: that one goes on."""
+    random = Random(seed)
+    lead, edge = random.choice([8, 30]), random.randrange(50, 200)
+    text = "".join(UNIT.format(unit=unit, board=board, lead=lead, replies="held") for unit, board in UNITS.items())
+    with Bench(text, switches={"y.EOT": ("y", edge, 10**6)}, jitter=lambda: random.randrange(300 * US)) as bench:
+        rough = Rough(bench, random)
+        bench.run(300 * MS)
+        for unit in UNITS:
+            bench.type(unit, "S20")
+            bench.run(100 * MS)
+        bench.type("x", "g+")
+        bench.type("y", random.choice(["g+", f"+{edge + 50}", "H+"]))
+        bench.run(random.randrange(100 * MS, 1500 * MS))
+        for unplugged in (False, True):
+            bench.ports[UNITS["x"]].unplugged = unplugged
+            if random.random() < 0.5:
+                bench.stall(random.randrange(lead * MS, 3 * lead * MS))
+        bench.run(500 * MS)
+        assert rough.axis("x").standing is Standing.FAULT
+        assert rough.axis("y").standing is Standing.DRIVEN, rough.axis("y").why
+        bench.type("y", "K")
+        bench.run(300 * MS)
+        bench.rest()
+        assert rough.axis("y").shaft == bench.position("y")
+
+
+def test_an_axis_goes_on_while_the_board_of_another_goes_away() -> None:
+    for seed in seeds(16):
+        neighbour(seed)
+
+
+@pytest.mark.slow
+def test_an_axis_goes_on_while_the_board_of_another_goes_away_in_many_sessions() -> None:
+    for seed in range(100, 400):
+        neighbour(seed)
 
 
 @pytest.mark.slow
