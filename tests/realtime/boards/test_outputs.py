@@ -1,6 +1,9 @@
 """Outputs: a change comes at its tick, is held back while it can still be taken back, and corrected where it cannot."""
 
+from random import Random
+
 import pytest
+from tests.generated import seeds
 from tests.realtime.boards.bench import Bench, bench
 
 from detent.ramps import constant_acceleration
@@ -179,3 +182,35 @@ def test_what_is_late_already_cannot_be_too_late(held: Ns) -> None:
     assert made.boards.ready
     assert not made.of(ShutDown)
     assert [level for _, level in changes(made)] == [True, False, True]
+
+
+def stood(seed: int) -> None:
+    """An output that changes, late or in time, on a board whose clock stands now and then (a process kept waiting)."""
+    random = Random(seed)
+    made = bench()
+    out, level = made.boards.outs["MOV"], False
+    for _ in range(30):
+        level = not level
+        out.set(level, made.now - random.choice([0, 0, random.randrange(100 * MS)]))
+        made.run(random.randrange(60 * MS))
+        if random.random() < 0.5:
+            made.ports[0].stand(random.randrange(40 * MS))
+            made.run(random.randrange(5 * MS))
+        if random.random() < 0.2:
+            level = not level
+            out.now(level)
+    made.run(4 * SECOND)
+    assert made.boards.ready, made.of(ShutDown)
+    assert made.machine.outputs["gpio6"] is level
+
+
+def test_nothing_is_said_at_once_before_the_board_has_said_that_what_was_queued_is_done() -> None:
+    """`update_digital_out` while a change is queued shuts the firmware down; an estimate of its clock may be off."""
+    for seed in seeds(40):
+        stood(seed)
+
+
+@pytest.mark.slow
+def test_clocks_that_stand_shut_no_output_down_in_many_sessions() -> None:
+    for seed in range(100, 500):
+        stood(seed)

@@ -39,6 +39,7 @@ class Clock:
     def __init__(self, frequency: int) -> None:
         self.frequency = frequency
         self.trips: deque[_Trip] = deque(maxlen=KEPT)
+        self.reached = -(1 << 62)  # the latest tick that the board itself has told: what was due by then is done
         self._wall: WallNs = 0  # the line: `_tick` at `_wall`, `_rate` ticks an ns
         self._tick = 0.0
         self._whole = 0  # ticks, apart from the fraction: floats keep 2**-20 of a tick so
@@ -63,6 +64,7 @@ class Clock:
 
     def note(self, tick: int, sent: WallNs, received: WallNs) -> bool:
         """A round trip; `tick` is a whole count. False: it does not fit, and is put aside until the next does not."""
+        self.reached = max(self.reached, tick)
         trip = _Trip((sent + received) // 2, received - sent, tick)
         if self.trips and not self._fits(trip):
             self._doubted = not self._doubted

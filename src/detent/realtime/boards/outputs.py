@@ -96,6 +96,8 @@ class DigitalOut:
         soonest = core.soonest(wall)
         if self._back is not None:
             self._correct(self._back, soonest, wall)
+        if self._back is not None:
+            return False  # what is set next comes behind it
         horizon = soonest + core.ticks(max(HOLD - core.setup.margin, core.setup.margin))
         known = None if heard is None else core.clock.tick_at(heard)
         waits = False
@@ -130,11 +132,10 @@ class DigitalOut:
         self._back = None
 
     def _give(self, tick: int, level: bool, soonest: int, wall: WallNs) -> bool:
-        """Whether there was room for it. What is late already has no time: that could be later still, on the wire."""
+        """Whether it was given. What is late already has no time: that could be later still, on the wire."""
         core = self._core
-        if tick < soonest and self._idle(wall) and core.link.spare >= ONE_CHANGE:
-            self._at_once(level, wall)
-            return True
+        if tick < soonest and self._last_tick < core.clock.tick_at(wall):
+            return self._at_once(level, wall)
         if core.queue.room(core.clock.tick_at(wall) - core.ticks(UNSURE)) <= 0 or core.link.spare < ONE_CHANGE:
             self._again_at = wall + RETRY
             return False
@@ -148,22 +149,27 @@ class DigitalOut:
 
     def _feed(self, wall: WallNs) -> None:
         """Say the level that it has, which must not wait for long."""
-        core = self._core
-        if not self._idle(wall):
-            self._again_at = core.clock.wall_at(self._last_tick + 2 * core.ticks(UNSURE))
-        elif core.link.spare < ONE_CHANGE:
-            self._again_at = wall + RETRY
-        else:
+        if self._last_tick < self._core.clock.tick_at(wall):
             self._at_once(self.level, wall)
+        else:
+            self._again_at = self._core.clock.wall_at(self._last_tick)
 
-    def _idle(self, wall: WallNs) -> bool:
-        """Whether everything that was queued has been done."""
-        return self._last_tick + self._core.ticks(UNSURE) < self._core.clock.tick_at(wall)
+    def _at_once(self, level: bool, wall: WallNs) -> bool:
+        """Say a level that has no time, and so cannot be late. Whether it was said.
 
-    def _at_once(self, level: bool, wall: WallNs) -> None:
-        """Say a level that has no time, and so cannot be late. Nothing may be queued."""
-        self._core.command("update_digital_out", oid=self.oid, value=int(level is not self.setup.pin.active_low))
+        What was queued is over by now, as far as can be told; but if it is not, the firmware shuts down. So the board
+        has to have told of a later tick, and is asked where it has not.
+        """
+        core = self._core
+        told = self._last_tick < core.clock.reached
+        if not told or core.link.spare < ONE_CHANGE:
+            self._again_at = wall + RETRY
+            if not told:
+                core.look_at_clock(wall)
+            return False
+        core.command("update_digital_out", oid=self.oid, value=int(level is not self.setup.pin.active_low))
         self.level, self._fed_at = level, wall
+        return True
 
     def _hungry(self, wall: WallNs) -> bool:
         at = self.deadline()

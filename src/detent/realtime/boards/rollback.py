@@ -44,7 +44,9 @@ class Rollback:
         """The firmware has stopped an axis: the cell is taken back to there."""
         began = self._wall()
         ledger = self._outgoing.by_stepper[event.stepper]
-        if ledger.motion is None and self._outgoing.inputs.stopped_before(event, ledger):
+        if self._stands(ledger, event.at) or (
+            ledger.motion is None and self._outgoing.inputs.stopped_before(event, ledger)
+        ):
             self.stopped_too(ledger, event)  # the input has stopped it in the cell already
             return
         ledger.guard.fired()
@@ -76,6 +78,9 @@ class Rollback:
         The cell lives through it once more, and does the same, so that every input is armed again where it was.
         """
         ledger = self._outgoing.by_stepper[event.stepper]
+        if self._stands(ledger, max(event.dry)):
+            self.stopped_too(ledger, event)
+            return
         found = [(ledger.instant_of(event.shaft, near), near) for near in event.dry]
         at = min(min(found, key=lambda pair: abs(pair[0] - pair[1]))[0], self._cell.now)
         guarded = ledger.guard.watched(at)
@@ -93,6 +98,11 @@ class Rollback:
                 ledger.stepper.tell(motion)
         self._outgoing.arm()
         self._outgoing.commit()
+
+    @staticmethod
+    def _stands(ledger: AxisLedger, at: Ns) -> bool:
+        """Whether an axis rests since it was placed where steps that had left would take it, behind a stop `at`."""
+        return ledger.motion is None and at < ledger.barred
 
     def _gates(self, ledger: AxisLedger, event: Stopped) -> bool:
         """Whether an input has stopped every single pulse of late."""

@@ -24,6 +24,7 @@ from detent.ticks import MS, SECOND, Ns
 LONGEST = 64  # steps of a run: looking further ahead costs more than it saves where a commit cuts runs anyway
 NOWHERE = -(1 << 62)  # before everything: the first run gets a base of its own
 LOOK_AGAIN: WallNs = 100 * MS  # slower than any step whose time is a matter of doubt
+CLOCK_AGAIN: WallNs = 1 * MS  # a board that was asked for its clock has answered by then, or soon
 SPARE = 4  # entries of the move queue that are left to outputs
 
 
@@ -94,6 +95,7 @@ class Stepper:
         self._stopped = False  # the firmware has stopped it, and has not just been left with what it had
         self._regaining = False
         self._proved = True  # the count was compared since the last pulse
+        self._again_at: WallNs = 0  # not sooner: the board was asked for its clock
         self._doubted: tuple[int, WallNs] | None = None  # by how much the count differed, and when that is believed
         self.said = 0  # messages up to its newest step
         self.dried = False  # it waits for `rewind`, as its steps were late
@@ -484,7 +486,7 @@ class Stepper:
         if last is None:
             return None
         core = self._core
-        at = core.clock.wall_at(last + core.ticks(self.setup.pulse * 2 + UNSURE))
+        at = max(core.clock.wall_at(last + core.ticks(self.setup.pulse * 2 + UNSURE)), self._again_at)
         return at if self._doubted is None else max(at, self._doubted[1])
 
     @property
@@ -495,9 +497,16 @@ class Stepper:
     def prove(self, wall: WallNs) -> None:
         """Ask the firmware for its count, and compare it unless something has been sent meanwhile.
 
-        One that differs is believed when it differs by the same a while later, behind another motion perhaps: a clock
-        that runs behind what is known of it steps later.
+        Before that the board has to have told of a tick behind the last step: an estimate of its clock may be off. One
+        that differs is believed when it differs by the same a while later, behind another motion perhaps: a clock that
+        runs behind what is known of it steps later.
         """
+        core = self._core
+        last = max(channel.last for channel in self._channels if channel.last is not None)
+        if core.clock.reached <= last + core.ticks(self.setup.pulse * 2):
+            self._again_at = wall + CLOCK_AGAIN
+            core.look_at_clock(wall)
+            return
         self._proved = True
         waiting = set(self.oids)
 
@@ -511,10 +520,8 @@ class Stepper:
                 self._doubted = None
             elif self._doubted is None or self._doubted[0] != by:
                 self._doubted, self._proved = (by, at + LOOK_AGAIN), False
-                self._core.look_at_clock(at)  # where it stands, its last step may be to come
             else:
-                core = self._core
                 core.events.append(CountDiffers(core.setup.name, self.name, self._told, self.counted()))
 
         for oid in self.oids:
-            self._core.ask("stepper_get_position", "stepper_position", came, wall, oid=oid)
+            core.ask("stepper_get_position", "stepper_position", came, wall, oid=oid)
