@@ -116,26 +116,17 @@ class Session:
         bench.run(500 * MS)
         bench.rest(20 * SECOND)
 
-    def stood(self, name: str, state: AxisState) -> bool:
-        """Steps that a stop on the other board had overtaken met a limit: that is told, with the firmware's count."""
-        if len(self.boards) == 1 or "nobody knows when that was" not in state.why:
-            return False
-        assert state.shaft == self.bench.position(name)
-        return True
-
     def check(self) -> int:
         bench = self.bench
         bench.check_inputs()
         assert bench.driven.rollback.escaped == 0
         for name, state in self.axes().items():
-            if self.stood(name, state):
-                continue
             assert state.standing is Standing.DRIVEN, state.why
             assert not state.moving
             if state.board not in self.restarted:
                 assert state.known
                 assert state.shaft == bench.position(name), bench.news
-        if not self.befallen and not any(self.stood(*item) for item in self.axes().items()):
+        if not self.befallen:
             assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
             assert len({(state.slips, state.slipped) for state in self.axes().values()}) == 1, "a slip is of the unit"
         for name, (axis, low, high) in self.limits.items():
