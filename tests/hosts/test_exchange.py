@@ -88,6 +88,7 @@ class Wire:
         self.kept = b""
         self.log: list[object] = []
         self.now = 0.0
+        self.away = 0.0  # for how long the computer is kept away each time that something is read
         self.broken = False
 
     def write(self, data: bytes) -> None:
@@ -99,6 +100,7 @@ class Wire:
         if self.kept:
             data, self.kept = self.kept, b""
             return data
+        self.now += self.away
         if self.chunks:
             return self.chunks.popleft()
         self.now += timeout
@@ -178,6 +180,18 @@ class Both:
 
 
 SHELLS = pytest.mark.parametrize("shell", ["blocking", "asynchronous"])
+
+
+@SHELLS
+def test_what_came_while_the_computer_was_kept_away_came_in_time(shell: str) -> None:
+    both = Both(shell, b"o", b"ne\r")
+    both.wire.away = 3.0
+    assert both.call("say", "x") == "one"
+    babbling = Both(shell, *[b"o"] * 100)
+    babbling.wire.away = 3.0
+    with pytest.raises(NoAnswer):
+        babbling.call("say", "x")
+    assert len(babbling.wire.chunks) == 98
 
 
 @SHELLS

@@ -12,7 +12,7 @@ Type checkers see all three. The ports behind the shells are in `detent.realtime
 lives in the virtual time of a cell.
 """
 
-from collections.abc import Callable, Coroutine, Generator
+from collections.abc import Callable, Coroutine, Generator, Iterator
 from contextlib import AbstractAsyncContextManager, AbstractContextManager, AsyncExitStack, ExitStack, closing
 from functools import cached_property, partial, update_wrapper
 from inspect import Signature, signature
@@ -214,6 +214,17 @@ class _Shell:
         return lost
 
 
+def _looks(clock: Callable[[], float], timeout: float) -> Iterator[float]:
+    """For how long to wait for more, each time: until `timeout` is over, and behind it not at all, once.
+
+    What has come by then while the computer was kept away came in time.
+    """
+    end = clock() + timeout
+    while (left := end - clock()) >= 0:
+        yield left
+    yield 0.0
+
+
 def _next(steps: Steps[T], answer: Answer | PortLost | None) -> Step:
     """The next step of an operation. A lost port is raised inside it: it may have to say what is where now."""
     if isinstance(answer, PortLost):
@@ -272,8 +283,7 @@ class Blocking(_Shell):
 
     def _read(self, complete: Callable[[bytes], int | None], timeout: float) -> Answer:
         port, came = self.port, b""
-        end = port.clock() + timeout
-        while (left := end - port.clock()) >= 0:
+        for left in _looks(port.clock, timeout):
             more = port.receive(left)
             if not more:
                 break
@@ -349,8 +359,7 @@ class Asynchronous(_Shell):
 
     async def _read(self, complete: Callable[[bytes], int | None], timeout: float) -> Answer:
         port, came = self.port, b""
-        end = port.clock() + timeout
-        while (left := end - port.clock()) >= 0:
+        for left in _looks(port.clock, timeout):
             more = await port.receive(left)
             if not more:
                 break
