@@ -91,7 +91,10 @@ class AxisLedger:
         before = told[place - 1] if place else None
         if isinstance(before, MotionStarted):
             return before.shaft + before.direction * entry.last
-        return self._shaft if place == len(told) - 1 else None
+        after = told[place + 1] if place + 1 < len(told) else None
+        if isinstance(after, MotionStarted):  # what was before that rest is not kept any more
+            return after.shaft + after.direction * (after.first - 1)
+        return self._shaft if after is None else None
 
     def end_told(self, now: Ns) -> None:
         """The motion that the stepper was told of last ends with what has left."""
