@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from detent.cell.actions import Action, SetPin
+from detent.cell.actions import SetPin
 from detent.cell.cell import Cell
 from detent.pins import Level
 from detent.realtime.boards.axis_ledger import AxisLedger
@@ -52,7 +52,7 @@ class CellInputs:
         other, at = self._stopped_last.get(event.input, (ledger, event.at))
         return other is not ledger and event.at < at
 
-    def taken_back(self, ledger: AxisLedger, event: Stopped, at: Ns) -> tuple[list[Action], set[Change]]:
+    def taken_back(self, ledger: AxisLedger, event: Stopped, at: Ns) -> tuple[list[SetPin], set[Change]]:
         """An input has stopped an axis at `at`: what the cell is given there, and which later changes it never had.
 
         What the switches of this axis are at was so at the stop already: it stands, and reports take their time.
@@ -69,7 +69,7 @@ class CellInputs:
         late = {self._plan.inputs[name] for name in (*others, event.input)}
         since = [change for change in self._changes if change.at > at]
         fresh = {(change.what.unit, change.what.pin) for change in since}
-        actions: list[Action] = []
+        actions: list[SetPin] = []
         for name, found in others.items():
             place = self._plan.inputs[name]
             if place in fresh or self._given[name] != found:
@@ -79,5 +79,6 @@ class CellInputs:
         actions.append(SetPin(unit, pin, int(event.level)))
         self._given[event.input] = int(event.level)
         drop = {change for change in since if (change.what.unit, change.what.pin) in late}
-        self._changes = deque((change for change in self._changes if change not in drop), maxlen=KEPT)
+        kept = [change for change in self._changes if change not in drop]
+        self._changes = deque([*kept, *(Change(at, action) for action in actions)], maxlen=KEPT)
         return actions, drop
