@@ -40,10 +40,12 @@ async def put_raw(client: Client, name: str, payload: bytes, kind: int, count: i
 async def gone(client: Client) -> bool:
     """Whether the server is rid of this client, within a minute."""
     try:
-        while await asyncio.wait_for(client._reader.read(65536), 60):
-            pass
-    except OSError:
+        async with asyncio.timeout(60):
+            await client._reader.read()  # to its end
+    except ConnectionError:
         return True
+    except TimeoutError:  # which is an OSError, too
+        return False
     return True
 
 

@@ -563,7 +563,7 @@ def test_a_stop_longer_ago_than_is_kept_is_a_fault_where_the_motor_stands() -> N
         bench.type("x", "M 2000")
         while bench.position("x") < 195:
             bench.run(1 * MS)
-        bench.driven.outgoing.past.clear()
+        bench.driven.outgoing.past.moments.clear()
         bench.run(500 * MS)
         bench.rest()
         state = bench.driven.axes()[0]

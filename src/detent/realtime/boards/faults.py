@@ -12,12 +12,8 @@ class Faults:
 
     def __init__(self, outgoing: Outgoing) -> None:
         self._outgoing = outgoing
-        self._cell, self._boards, self._ledgers, self._past = (
-            outgoing.cell,
-            outgoing.boards,
-            outgoing.ledgers,
-            outgoing.past,
-        )
+        self._cell, self._boards, self._ledgers = outgoing.cell, outgoing.boards, outgoing.ledgers
+        self._past = outgoing.past
         self.abandoned = False  # the cell cannot go on, and so nothing is done for it any more
         outgoing.stores.failed = self._not_written
         outgoing.currents.refused = self.fault

@@ -48,10 +48,6 @@ class Past:
             del self.moments[0]
         return self.moments[0] if self.moments else None
 
-    def clear(self) -> None:
-        """Nobody goes back."""
-        self.moments.clear()
-
     def reaches(self, at: Ns) -> bool:
         """Whether a moment at or before `at` is kept."""
         return bool(self.moments) and self.moments[0].now <= at

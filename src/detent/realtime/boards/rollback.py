@@ -27,14 +27,8 @@ class Rollback:
 
     def __init__(self, outgoing: Outgoing, faults: Faults) -> None:
         self._outgoing, self._faults = outgoing, faults
-        self._cell, self._boards, self._plan, self._ledgers, self._past, self._wall = (
-            outgoing.cell,
-            outgoing.boards,
-            outgoing.plan,
-            outgoing.ledgers,
-            outgoing.past,
-            outgoing.wall,
-        )
+        self._cell, self._boards, self._plan = outgoing.cell, outgoing.boards, outgoing.plan
+        self._ledgers, self._past, self._wall = outgoing.ledgers, outgoing.past, outgoing.wall
         self.on_taken_back: Callable[[Ns], None] = lambda at: None  # what the cell did behind `at` did not happen
         self.escaped = 0  # characters that hosts heard though they were taken back
         self.rewinds = 0
