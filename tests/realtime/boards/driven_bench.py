@@ -252,6 +252,16 @@ class Bench:
             given = self.cell.forced[self.cell.unit(unit), pin]
             assert bool(given) is board.inputs[name], f"{name} is {board.inputs[name]}, and {given} in the cell"
 
+    def check_outputs(self) -> None:
+        """Behind a rest every output of a driven unit is on its pin as the cell has it."""
+        for out in self.driven.outgoing.outs.values():
+            board = next(name for name, board in self.boards.boards.items() if out.name in board.outs)
+            self.ports[board].run_to(self.wall)
+            pin = self.boards.outs[out.name].setup.pin
+            found = self.machines[board].outputs[pin.name] is not pin.active_low
+            [*_, (at, level)] = out.levels.before(out.levels.count)
+            assert found is level, f"{out.name} is {found}, and {level} in the cell since {at / 1e9:.4f} s"
+
     def position(self, stepper: str) -> int:
         """Where the motor is."""
         board = self.boards.home[stepper]

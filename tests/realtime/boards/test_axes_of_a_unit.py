@@ -119,6 +119,7 @@ class Session:
     def check(self) -> int:
         bench = self.bench
         bench.check_inputs()
+        bench.check_outputs()
         assert bench.driven.rollback.escaped == 0
         for name, state in self.axes().items():
             assert state.standing is Standing.DRIVEN, state.why

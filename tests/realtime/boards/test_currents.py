@@ -5,7 +5,7 @@ from tests.realtime.boards.test_driven import CELL, DCB, LEAD, levels
 
 from detent.realtime.boards.events import DriverFault
 from detent.realtime.boards.states import Standing
-from detent.ticks import MS, SECOND
+from detent.ticks import MS, SECOND, US
 
 
 def test_a_plain_driver_is_not_left_with_all_its_current_when_the_host_dies() -> None:
@@ -41,6 +41,23 @@ def test_a_plain_driver_gets_half_of_its_current_at_rest() -> None:
         edges = [bench.boards.boards["b"].core.scale.time(tick) for tick, _ in bench.edges("x")]
         assert full < edges[0]
         assert half > edges[-1]
+
+
+def test_a_plain_driver_has_all_its_current_in_a_motion_that_follows_a_recovery_at_once() -> None:
+    """The board fell to half of it, in a motion; nobody says anything of the current before the next one."""
+    text = CELL.replace('enable = "!gpio4"', 'enable = "!gpio4"\ndriver = { kind = "plain", half = "gpio20" }')
+    with Bench(text.replace('"30 ms"', '"60 ms"')) as bench:
+        bench.run(300 * MS)
+        bench.type("x", "+400")
+        bench.run(300 * MS)
+        bench.driven.stop()
+        bench.driven.recover()
+        while bench.driven.axes()[0].standing is not Standing.DRIVEN:
+            bench.run(100 * US)
+        bench.type("x", "+400")
+        bench.run(300 * MS)
+        assert bench.driven.axes()[0].moving
+        assert [level for _, level in levels(bench, "gpio20")[-2:]] == [True, False]
 
 
 def test_a_driver_that_fails_in_mid_move_stops_its_axis() -> None:

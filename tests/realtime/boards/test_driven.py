@@ -269,6 +269,36 @@ def test_an_emergency_stop_stands_until_recover_and_goes_on_without_configuring(
         assert levels(bench, "gpio4")[-1][1] is False
 
 
+@pytest.mark.parametrize("end", ["a switch", "a late computer"])
+@pytest.mark.parametrize("befallen", ["stopped", "unplugged", "restarted"])
+def test_a_driver_stays_switched_on_behind_a_recovery(befallen: str, end: str) -> None:
+    """What takes the cell back, or makes it late, leaves outputs as they are: a motor that is let go loses steps."""
+    with Bench(CELL, switches={"x.EOT": ("x", 200, 10**6), "x.HOME": ("x", -(10**6), 150)}) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+50")
+        bench.rest()
+        if befallen == "stopped":
+            bench.driven.stop()
+        else:
+            bench.ports["b"].unplugged = True
+        bench.run(500 * MS)
+        if befallen == "restarted":
+            bench.ports["b"].board.clear()
+        bench.come_back()
+        bench.run(2 * SECOND)
+        bench.check_outputs()
+        begun = bench.wall
+        bench.type("x", "H+" if end == "a switch" else "+400")
+        bench.run(100 * MS)
+        if end == "a late computer":
+            bench.stall(100 * MS)
+        bench.rest()
+        assert bench.driven.axes()[0].stops or bench.driven.axes()[0].slips
+        bench.check_outputs()
+        scale = bench.boards.boards["b"].core.scale
+        assert [level for at, level in levels(bench, "gpio4") if at > scale.time(bench.ports["b"].tick_at(begun))] == []
+
+
 def test_a_board_that_shuts_down_by_itself_is_told_and_recovered() -> None:
     with Bench(CELL) as bench:
         bench.run(100 * MS)

@@ -49,7 +49,7 @@ def test_what_was_not_given_to_the_board_is_taken_back_without_a_trace() -> None
     made.boards.stops["slide"].arm({"EOT": False}, at)
     out.set(True, at + 1)
     made.run(5 * MS)  # of a lead of 30: it is still here
-    out.rewind(at)
+    out.rewind(at, False)
     made.run(100 * MS)
     assert changes(made) == []
     assert out.corrections == 0
@@ -61,7 +61,7 @@ def test_what_has_left_is_corrected() -> None:
     out.set(True, made.now + 1)
     at = made.now
     made.run(27 * MS)
-    out.rewind(at)
+    out.rewind(at, False)
     made.run(100 * MS)
     assert [level for _, level in changes(made)] == [True, False]
     assert out.corrections == 1
@@ -102,7 +102,7 @@ def test_what_has_left_and_is_set_again_alike_stays() -> None:
     at = made.now + 1
     out.set(True, at)
     made.run(27 * MS)
-    out.rewind(at - 1)
+    out.rewind(at - 1, False)
     out.set(True, at)
     made.run(100 * MS)
     assert [level for _, level in changes(made)] == [True]
@@ -116,7 +116,7 @@ def test_what_is_set_otherwise_behind_a_rewind_ends_as_it_was_set() -> None:
     out.set(True, at + 1)
     out.set(False, at + 2 * MS)
     made.run(29 * MS)
-    out.rewind(at)
+    out.rewind(at, False)
     out.set(True, at + 1 * MS)
     made.run(100 * MS)
     assert changes(made)[-1][1] is True

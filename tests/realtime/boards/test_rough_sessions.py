@@ -121,6 +121,7 @@ def session(seed: int) -> int:
         bench.run(300 * MS)
         bench.rest()
         bench.check_inputs()
+        bench.check_outputs()
         for state in bench.driven.axes():
             assert state.standing is Standing.DRIVEN, state.why
             assert state.known or state.board in rough.restarted, state

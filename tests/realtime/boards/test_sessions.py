@@ -140,6 +140,7 @@ def session(kind: str, seed: int) -> int:
                 bench.run(100 * MS)
         bench.rest(20 * SECOND)
         bench.check_inputs()
+        bench.check_outputs()
         assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
         assert bench.driven.rollback.escaped == 0
         for state, stepper in zip(bench.driven.axes(), what.steppers, strict=True):
@@ -236,6 +237,7 @@ def tapped(seed: int) -> None:
         assert [state.shaft for state in bench.driven.axes()] == [bench.position("x.X"), bench.position("x.Y")]
         assert bench.driven.rollback.escaped == 0
         bench.check_inputs()
+        bench.check_outputs()
 
 
 @pytest.mark.parametrize("ahead", [2, 15, 25])

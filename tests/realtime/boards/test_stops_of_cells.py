@@ -86,6 +86,7 @@ def compare(case: Case, lead: int, seed: int) -> int:
         assert bench.said("x") == heard
         assert bench.driven.rollback.escaped == 0
         bench.check_inputs()
+        bench.check_outputs()
         return bench.driven.rollback.rewinds
 
 

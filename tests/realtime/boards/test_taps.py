@@ -52,6 +52,7 @@ def session(kind: str, seed: int) -> None:
             bench.run(100 * MS)
         bench.rest(20 * SECOND)
         bench.check_inputs()
+        bench.check_outputs()
         assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
         assert bench.driven.rollback.escaped == 0
         for state, stepper in zip(bench.driven.axes(), what.steppers, strict=True):

@@ -62,6 +62,7 @@ def run(seed: int) -> int:
         bench.send("x", b"\x1b")
         bench.rest()
         bench.check_inputs()
+        bench.check_outputs()
         places = [place for _, place in bench.edges("x")]
         assert all(-edge <= place <= edge for place in places), f"{min(places)} to {max(places)} of {edge}"
         assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
@@ -115,6 +116,7 @@ def asked_while_late(seed: int) -> int:
         bench.type("x", "Z 0")
         bench.run(200 * MS)
         bench.check_inputs()
+        bench.check_outputs()
         assert bench.driven.rollback.escaped == 0, bench.news
         assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
         state = bench.driven.axes()[0]
@@ -154,6 +156,7 @@ def test_a_home_that_is_left_at_the_pins_when_it_is_looked_for_is_looked_for_ane
         assert state.stops == 2, "home that is left already; and the limit on the way that it looks then"
         assert state.shaft == bench.position("x") == 300
         bench.check_inputs()
+        bench.check_outputs()
 
 
 @pytest.mark.slow

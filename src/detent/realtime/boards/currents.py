@@ -35,7 +35,8 @@ class Currents:
                 self.command(ledger)
 
     def command(self, ledger: AxisLedger) -> None:
-        """Tell the driver of an axis its current."""
+        """Tell the driver of an axis its current, whatever it was told before."""
+        self._halved.pop(ledger.name, None)
         stage = self._stages.get(ledger.name)
         if stage is None or not ledger.what.driver:
             return

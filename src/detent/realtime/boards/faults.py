@@ -104,6 +104,9 @@ class Faults:
                     unsure = "since the restart nobody knows where the motor stands"
                 self._outgoing.say(Weight.WARNING, f"{what}; {unsure}")
             self._driven_again(ledger)
+        for out in self._outgoing.outs.values():
+            if out.name in self._boards.boards[event.board].outs:
+                self._outgoing.set_now(out)
         for name, level in event.inputs.items():
             if self._outgoing.inputs.differs(name, int(level)):
                 self._outgoing.give(name, int(level))
@@ -119,11 +122,9 @@ class Faults:
         ledger.guard.release()
         ledger.barred = self._cell.now
         ledger.standing, ledger.why, ledger.known, ledger.awaits = Standing.DRIVEN, "", not ledger.lost, None
-        unit = self._cell.unit(ledger.what.unit)
         for out in self._outgoing.outs.values():
-            levels = out.levels.before(out.levels.count)
-            if out.unit == unit and levels:
-                self._boards.outs[out.name].now(levels[-1][1])
+            if out.name == ledger.what.enable:  # it was withheld
+                self._outgoing.set_now(out)
         self._outgoing.currents.command(ledger)
         self._outgoing.pending = True
 

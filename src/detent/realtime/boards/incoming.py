@@ -102,11 +102,9 @@ class Incoming:
         """Pulses from `at` on come later: so do the outputs of the unit."""
         unit = self._outgoing.cell.unit(ledger.what.unit)
         for out in self._outgoing.outs.values():
-            after = [item for item in out.levels.before(out.levels.count) if item[0] >= at]
-            if out.unit == unit and after:
-                self._outgoing.boards.outs[out.name].rewind(at)
-                for when, level in after:
-                    self._outgoing.set(out, level, when)
+            count = out.levels.count - sum(when > at for when, _ in out.levels.before(out.levels.count))
+            if out.unit == unit and count < out.levels.count:
+                self._outgoing.set_anew(out, count, at)
 
     def _found(self, name: str, level: bool) -> None:
         """An input has this level; the cell gets it, if it has another one."""

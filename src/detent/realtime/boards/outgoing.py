@@ -208,11 +208,30 @@ class Outgoing:
 
     def set(self, out: Out, level: bool, at: Ns) -> None:
         """An output takes a level at cell time `at`."""
-        ledgers = self._of_unit.get(out.unit, ())
-        if any(ledger.what.enable == out.name and ledger.standing is Standing.FAULT for ledger in ledgers):
+        if self._withheld(out):
             return
-        self.boards.outs[out.name].set(level, at, max((ledger.stepper.lag for ledger in ledgers), default=0))
+        lag = max((ledger.stepper.lag for ledger in self._of_unit.get(out.unit, ())), default=0)
+        self.boards.outs[out.name].set(level, at, lag)
         self.pending = True
+
+    def set_anew(self, out: Out, count: int, at: Ns) -> None:
+        """The board has an output as it was at `at`, behind its first `count` levels, and is told of those since."""
+        if self._withheld(out):
+            return
+        self.boards.outs[out.name].rewind(at, out.levels.before(count)[-1][1])
+        for when, level in out.levels.since(count):
+            self.set(out, level, when)
+
+    def set_now(self, out: Out) -> None:
+        """An output takes the level that it has in the cell, as soon as may be: nobody knows which one it had."""
+        if not self._withheld(out):
+            self.boards.outs[out.name].now(out.levels.before(out.levels.count)[-1][1])
+            self.pending = True
+
+    def _withheld(self, out: Out) -> bool:
+        """Whether an output is not changed, whatever the cell says: it enables the driver of an axis at fault."""
+        ledgers = self._of_unit.get(out.unit, ())
+        return any(ledger.what.enable == out.name and ledger.standing is Standing.FAULT for ledger in ledgers)
 
     def arm(self) -> None:
         """Let the firmware watch the inputs that would cut what is under way."""

@@ -36,9 +36,7 @@ class DigitalOut:
         self.corrections = 0
         self._core = core
         self._pending: deque[_Change] = deque()
-        self._given: deque[_Change] = deque(maxlen=256)
         self._last_tick = PAST  # of what was given
-        self._first = setup.initial  # before all that was given
         self._back: bool | None = None  # taken back: the level that it had there
         self._rewound = False
         self._fed_at: WallNs | None = None
@@ -63,17 +61,15 @@ class DigitalOut:
         """
         self._pending.append(_Change(at, self._core.scale.tick(at + lag), level))
 
-    def rewind(self, at: Ns) -> None:
-        """The cell is taken back to `at`: changes behind it are forgotten; what is set next is the truth.
+    def rewind(self, at: Ns, level: bool) -> None:
+        """The cell is taken back to `at`, where it has the output at `level`; what is set next is the truth.
 
-        Where they had been given to the board and are not set again alike, they are corrected with the next commit.
+        What had been given to the board for later, and is not set again alike, is corrected with the next commit.
         """
         while self._pending and self._pending[-1].at > at:
             self._pending.pop()
-        while self._given and self._given[-1].at > at:
-            self._given.pop()
-        self._back = self._given[-1].level if self._given else self._first
-        self._rewound = True
+        if not self._pending:  # else all that was given is for before `at`
+            self._back, self._rewound = level, True
 
     def now(self, level: bool) -> None:
         """Take `level` as soon as may be, behind what was given to the board before; what was not is forgotten."""
@@ -109,7 +105,6 @@ class DigitalOut:
             if not self._give(change.tick, change.level, soonest, wall):
                 self._pending.appendleft(change)
                 return False
-            self._given.append(change)
         if self._hungry(wall):
             self._feed(wall)
         return waits
@@ -120,10 +115,8 @@ class DigitalOut:
 
     def _correct(self, level: bool, soonest: int, wall: WallNs) -> None:
         """Behind a rewind: what is set for ticks that are given away already cannot come then."""
-        at: Ns = 0
         while self._pending and self._pending[0].tick <= self._last_tick:
-            at, _, level = self._pending.popleft()
-            self._given.append(_Change(at, self._last_tick, level))
+            level = self._pending.popleft().level
         if level is not self.level:
             if not self._give(PAST, level, soonest, wall):
                 self._back = level
@@ -196,9 +189,8 @@ class DigitalOut:
 
     def began(self, wall: WallNs, level: bool | None = None) -> None:
         """The board is configured, or ready again, with the output at `level` (None: as it is set up)."""
-        self.level = self._first = self.setup.initial if level is None else level
+        self.level = self.setup.initial if level is None else level
         self._pending.clear()
-        self._given.clear()
         self._back = None
         self._last_tick = PAST
         self._fed_at = wall - (self.setup.watchdog or 0)

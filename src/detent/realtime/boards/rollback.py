@@ -186,7 +186,7 @@ class Rollback:
         self._outgoing.arm()
         self._outgoing.commit()
         for out in self._outgoing.outs.values():
-            self._tell_out(out, levels[out.name], out.levels.since(places[out.name]), at, stopped)
+            self._tell_out(out, levels[out.name], places[out.name], at, stopped)
         self._outgoing.pending = True
 
     def _levels_in(self, batches: Sequence[Batch], out: Out) -> int:
@@ -237,18 +237,16 @@ class Rollback:
         for motion in (*([force] if force is not None else []), *new):
             ledger.stepper.tell(motion)
 
-    def _tell_out(
-        self, out: Out, old: list[tuple[Ns, bool]], new: list[tuple[Ns, bool]], at: Ns, stopped: AxisLedger
-    ) -> None:
+    def _tell_out(self, out: Out, old: list[tuple[Ns, bool]], count: int, at: Ns, stopped: AxisLedger) -> None:
+        """Tell the boards what an output does behind its first `count` levels, where it did `old` before."""
+        new = out.levels.since(count)
         mine = out.unit == self._cell.unit(stopped.what.unit)
         same = alike(old, new)
         if not mine and same == len(old):
             for when, level in new[same:]:
                 self._outgoing.set(out, level, when)
-            return
-        self._boards.outs[out.name].rewind(at)
-        for when, level in new:
-            self._outgoing.set(out, level, when)
+        else:
+            self._outgoing.set_anew(out, count, at)
 
     def stopped_too(self, ledger: AxisLedger, event: Stopped) -> None:
         """What stopped another axis stopped this one at the same instant: the cell has been there already.

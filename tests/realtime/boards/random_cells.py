@@ -1,0 +1,187 @@
+"""Random cells behind pins: units of any kind, each axis on one board or another, wired in any way that may be."""
+
+from collections import Counter
+from collections.abc import Mapping
+from random import Random
+
+from tests.realtime.boards.driven_bench import Bench
+
+from detent.ticks import MS
+
+FAR = 10**6
+NOWHERE: Mapping[str, tuple[int, int]] = {}
+LINES = {
+    "gs-c200s": "S{s} T{t} R{k} +{n} -{n} g+ g- H+ H- A1 C1 A2 C2 g+1 Z K G{n}",
+    "bs0610": "X{n}G X-{n}G Y{n}G Y-{n}G X+S X-S B+S B{n}G BZ XZ X{n}GYZ R{t} K{k} !",
+    "supersigma": "originate move+{n} move-{n} stop emergency",
+    "dcb-274": "+{n} -{n} M{r} M-{r} M0 F{r},0 F{r},1 @ \x1b Z0 R{n} R-{n} |",
+}
+"""What a host may say to each kind."""
+
+
+class RandomCell:
+    """A cell file, the switches of its machine, and what hosts and hands may do with it.
+
+    `text` is the file; `units` are names and models; `steppers` the axes; `switches` are closed by the machine, as
+    `driven_bench.Bench` takes them; `hands` are the other inputs. Every input rests where it is 1.
+    """
+
+    def __init__(self, random: Random) -> None:
+        self._random = random
+        self.boards = "ab"[: random.choice([1, 1, 2])]
+        self.lead = random.choice([5, 10, 30, 60])
+        self.replies = random.choice(["held", "held", "held", "at once"])
+        self.units: list[tuple[str, str]] = []
+        self.steppers: list[str] = []
+        self.switches: dict[str, tuple[str, int, int]] = {}
+        self.hands: list[str] = []
+        self.limits: list[str] = []  # switches that no step may pass
+        self._pins: Counter[str] = Counter()
+        self.text = ""
+        make = {
+            "gs-c200s": self._gsc200, "bs0610": self._genstepper, "supersigma": self._supersigma,
+            "dcb-274": self._dcb274,
+        }  # fmt: skip
+        for name in "xyz"[: random.choice([1, 1, 2, 2, 3])]:
+            model = random.choice(["gs-c200s", "gs-c200s", "bs0610", "supersigma", "dcb-274"])
+            self.units.append((name, model))
+            make[model](name)
+        self._lines()
+        for board in self.boards:
+            self.text += f'[boards.{board}]\nserial = "fake{board}"\nlead = "{self.lead} ms"\n'
+            self.text += f'replies = "{self.replies}"\n' + random.choice(["", 'watchdog = "2 s"\n'])
+
+    def bring_to_rest(self, bench: Bench) -> None:
+        """Hands let go, and hosts end whatever moves."""
+        for pin in self.hands:
+            bench.press(pin, 1)
+        bench.run(400 * MS)
+        for unit, model in self.units:
+            match model:
+                case "gs-c200s":
+                    bench.type(unit, "@")
+                    bench.run(50 * MS)
+                    bench.type(unit, "K")
+                case "dcb-274":
+                    bench.send(unit, b"\x1b")
+                case "bs0610" if f"{unit}.RST" in self.hands:
+                    bench.press(f"{unit}.RST", 0)
+                    bench.run(100 * MS)
+                    bench.press(f"{unit}.RST", 1)
+                    bench.run(450 * MS)
+                case "bs0610":
+                    bench.send(unit, b"!BZ!BZ")
+                    bench.run(450 * MS)
+                case "supersigma":
+                    bench.type(unit, "emergency")
+            bench.run(50 * MS)
+
+    def say(self, bench: Bench) -> None:
+        """A host says something."""
+        random = self._random
+        unit, model = random.choice(self.units)
+        line = random.choice(LINES[model].split(" ")).format(
+            n=random.randrange(1, 800), r=random.randrange(200, 4000), s=random.choice([5, 20, 50]),
+            t=random.randrange(50, 300), k=random.randrange(1, 60),
+        )  # fmt: skip
+        if model == "bs0610" or len(line) == 1:
+            bench.send(unit, line.encode())
+        elif model == "supersigma":
+            bench.type(unit, line.replace("+", " +").replace("-", " -"))
+        elif model == "dcb-274" and len(self._party()) > 1:
+            bench.type(unit, unit.upper() + line)
+        else:
+            bench.type(unit, line)
+
+    def _party(self) -> list[str]:
+        return [unit for unit, model in self.units if model == "dcb-274"]
+
+    def _lines(self) -> None:
+        party = self._party()
+        if len(party) > 1:
+            self.text += f"[lines.bus]\nunits = {party}\n"
+            for unit, model in self.units:
+                if model != "dcb-274":
+                    self.text += f'[lines.to_{unit}]\nunits = ["{unit}"]\n'
+        modules = [unit for unit, model in self.units if model == "gs-c200s"]
+        if len(modules) > 1 and self._random.random() < 0.3:
+            self.text += f'[[wires]]\nfrom = "{modules[0]}.UO1"\nto = "{modules[1]}.UI2"\n'
+
+    def _pin(self, board: str) -> str:
+        self._pins[board] += 1
+        return f"gpio{self._pins[board] + 1}"
+
+    def _any(self, board: str) -> str:
+        """A pin that is active at either level."""
+        return self._random.choice(["", "!"]) + self._pin(board)
+
+    def _unit(self, unit: str, model: str, board: str, more: str = "") -> None:
+        self.text += f'[units.{unit}]\nmodel = "{model}"\n{more}[hardware.{unit}]\nboard = "{board}"\n'
+
+    def _motor(self, name: str, board: str) -> None:
+        self.steppers.append(name)
+        self.text += f'step = "{self._any(board)}"\ndir = "{self._any(board)}"\n'
+        if self._random.random() < 0.6:
+            self.text += f'enable = "{self._any(board)}"\n'
+
+    def _outputs(self, board: str, *names: str) -> None:
+        chosen = [f'{name} = "{self._any(board)}"' for name in names if self._random.random() < 0.6]
+        self.text += f"outputs = {{ {', '.join(chosen)} }}\n" if chosen else ""
+
+    def _inputs(
+        self, unit: str, board: str, *names: str, axis: str = "", places: Mapping[str, tuple[int, int]] = NOWHERE
+    ) -> None:
+        """`places`: where the machine of `axis` closes which input, if it does."""
+        random, wired = self._random, []
+        for name in names:
+            full = f"{unit}.{name}"
+            if name in places and random.random() < 0.5:
+                self.switches[full] = (axis, *places[name])
+                if name not in ("EOT", "HOME", "RAIL"):
+                    self.limits.append(full)
+            elif name not in places and random.random() < 0.3:
+                if random.random() < 0.5:
+                    wired.append(f'"{name}" = "^{self._pin(board)}"')  # nobody touches it
+                continue
+            else:
+                self.hands.append(full)
+            wired.append(f'"{name}" = "{random.choice(["", "!"])}^{self._pin(board)}"')
+        self.text += f"inputs = {{ {', '.join(wired)} }}\n" if wired else ""
+
+    def _gsc200(self, unit: str) -> None:
+        random, board = self._random, self._random.choice(self.boards)
+        self._unit(unit, "gs-c200s", board, 'straps = { CHS = "low" }\n')
+        self._motor(unit, board)
+        self._outputs(board, "MOV", "RDY", "RAMP", "UO1")
+        end = random.randrange(30, 400)
+        places = {"EOT": (end, FAR), "HOME": (-FAR, random.randrange(-20, end))}
+        self._inputs(unit, board, "EOT", "HOME", "ENABLE", "UI1", axis=unit, places=places)
+
+    def _dcb274(self, unit: str) -> None:
+        board, end = self._random.choice(self.boards), self._random.randrange(30, 300)
+        self._unit(unit, "dcb-274", board, f'options = {{ name = "{unit.upper()}" }}\n')
+        self._motor(unit, board)
+        self._outputs(board, "P5")
+        names = ("LIMIT-A", "LIMIT-B", "HOME", "JOG1", "JOG2")
+        places = {"LIMIT-A": (end, FAR), "LIMIT-B": (-FAR, -end), "HOME": (-20, -10)}
+        self._inputs(unit, board, *names, axis=unit, places=places)
+
+    def _supersigma(self, unit: str) -> None:
+        board, end = self._random.choice(self.boards), self._random.randrange(30, 400)
+        self._unit(unit, "supersigma", board)
+        self._motor(unit, board)
+        self._outputs(board, "P23")
+        self._inputs(unit, board, "FORCE", "RAIL", axis=unit, places={"RAIL": (-FAR, -end // 8 - 2)})
+
+    def _genstepper(self, unit: str) -> None:
+        shared, end = self._random.choice(self.boards), self._random.randrange(30, 400)
+        self._unit(unit, "bs0610", shared, 'options = { hard_stop = "yes" }\n')
+        self._outputs(shared, "RDY")
+        self._inputs(unit, shared, "RST", "Y+", "X+", "X-")
+        for axis in "XY":
+            board = self._random.choice(self.boards)
+            self.text += f'[hardware.{unit}.{axis}]\nboard = "{board}"\n'
+            self._motor(f"{unit}.{axis}", board)
+            low, high = f"L{axis}-", f"L{axis}+"
+            places = {low: (-FAR, -end // 2), high: (end, FAR)}
+            self._inputs(unit, board, low, high, axis=f"{unit}.{axis}", places=places)

@@ -1,0 +1,152 @@
+"""Any cell behind any boards, and everything at once: hosts, hands, switches, late computers, boards that fail.
+
+At the end each motor is where the cell has it, or is said not to be known; every input is in the cell as on its board,
+and every output on its pin as in the cell; no axis has passed its limits, and none is at fault without a reason.
+"""
+
+from random import Random
+
+import pytest
+from tests.generated import seeds
+from tests.realtime.boards.driven_bench import Bench
+from tests.realtime.boards.random_cells import RandomCell
+
+from detent.realtime.boards.states import Standing, Weight
+from detent.ticks import MS, SECOND, US, Ns
+
+
+class Session:
+    """One of them. `rough`: boards are unplugged, restarted, stopped by hand and recovered, too."""
+
+    def __init__(self, seed: int, *, rough: bool) -> None:
+        self.random = random = Random(seed)
+        self.cell, self.rough = RandomCell(random), rough
+        self.befallen, self.restarted = False, set[str]()
+        chance, self.late = random.choice([0.0, 0.0, 0.001, 0.003]), False
+        jitter = random.choice([50, 400, 400, 1000 if self.cell.lead == 5 else 3000]) * US
+
+        def away(_: bool) -> Ns:
+            return random.randrange(90 * MS) if self.late and random.random() < chance else 0
+
+        self.bench = Bench(
+            self.cell.text, switches=self.cell.switches, jitter=lambda: random.randrange(jitter), away=away,
+            spare_exposed=True,
+            port={"drift": random.choice([0.0, 60.0, -90.0]), "delay": random.choice([30, 100, 800]) * US},
+        )  # fmt: skip
+
+    def befall(self) -> None:
+        """Something happens to a board, or somebody recovers what stands."""
+        bench, random = self.bench, self.random
+        self.late, self.befallen = False, True
+        board = random.choice(list(bench.ports))
+        match random.choice(["unplugged", "restarted", "stopped", "recovered", "recovered"]):
+            case "unplugged":
+                bench.ports[board].unplugged = True
+                bench.run(random.choice([60, 1200]) * MS)
+            case "restarted" if not bench.ports[board].unplugged:
+                bench.ports[board].board.power_cycle()
+                self.restarted.add(board)
+                bench.run(1200 * MS)
+            case "stopped":
+                bench.driven.stop()
+                bench.run(30 * MS)
+                stood = [bench.position(axis) for axis in self.cell.steppers]
+                bench.run(100 * MS)
+                assert [bench.position(axis) for axis in self.cell.steppers] == stood
+            case "recovered":
+                bench.come_back()
+        self.late = True
+
+    def switch_off_and_on(self) -> None:
+        """Somebody switches a unit."""
+        unit, _ = self.random.choice(self.cell.units)
+        self.bench.power(unit, False)
+        self.bench.run(self.random.randrange(300 * MS) + 1)
+        self.bench.power(unit, True)
+        self.bench.run(self.random.randrange(600 * MS) + 1)
+
+    def tap(self) -> None:
+        """Somebody touches an input, for some milliseconds or for good."""
+        bench, random = self.bench, self.random
+        pin = random.choice(self.cell.hands)
+        level = random.randrange(2) if random.random() < 0.2 else 0
+        bench.press(pin, level)
+        bench.run(random.randrange(2 * MS, random.choice([6, 40, 120]) * MS))
+        if random.random() < 0.85:
+            bench.press(pin, 1 - level)
+        bench.run(random.randrange(5 * MS) + 1)
+
+    def live(self) -> None:
+        """What happens."""
+        bench, random = self.bench, self.random
+        bench.run(400 * MS)
+        for pin in self.cell.hands:
+            if random.random() < 0.9:
+                bench.press(pin, 1)
+        bench.run(60 * MS)
+        for unit, model in self.cell.units:
+            if model == "dcb-274":
+                bench.type(unit, " ")
+                bench.run(100 * MS)
+        self.late = True
+        for _ in range(random.randrange(4, 16)):
+            if random.random() < 0.75:
+                self.cell.say(bench)
+            span = random.choice([60 * MS, 1 * MS, 8 * MS, 200 * MS, 900 * MS])
+            bench.run(random.choice([span, random.randrange(span)]) + 1)
+            if random.random() < 0.12:
+                bench.stall(random.randrange(5 * MS, 120 * MS))
+            if random.random() < 0.04:
+                self.switch_off_and_on()
+            if self.rough and random.random() < 0.15:
+                self.befall()
+            for _ in range(random.randrange(3) if self.cell.hands else 0):
+                self.tap()
+        self.late = False
+
+    def check(self) -> int:
+        """That nothing is lost or hidden; how many stops there were."""
+        bench, cell = self.bench, self.cell
+        bench.check_inputs()
+        bench.check_outputs()
+        assert bench.driven.rollback.escaped == 0 or cell.replies == "at once"
+        if not self.befallen:
+            assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        for state, name in zip(bench.driven.axes(), cell.steppers, strict=True):
+            assert state.standing is Standing.DRIVEN, state.why
+            assert not state.moving, name
+            if state.board not in self.restarted:
+                assert state.known
+                assert state.shaft == bench.position(name), name
+        for name in cell.limits:
+            axis, low, high = cell.switches[name]
+            if bench.plan.board_of[name] == bench.boards.home[axis]:
+                places = [0, *(place for _, place in bench.edges(axis))]
+                assert not [place for place in places if low < place < high], name
+        return sum(state.stops for state in bench.driven.axes())
+
+    def run(self) -> int:
+        """How many stops there were."""
+        with self.bench:
+            self.live()
+            if self.befallen:
+                for pin in self.cell.hands:
+                    self.bench.press(pin, 1)
+                self.bench.run(400 * MS)
+                self.bench.come_back()
+                self.bench.come_back()
+            self.cell.bring_to_rest(self.bench)
+            self.bench.rest(20 * SECOND)
+            return self.check()
+
+
+@pytest.mark.parametrize("rough", [False, True])
+def test_nothing_is_lost_in_any_cell(rough: bool) -> None:
+    assert sum(Session(seed, rough=rough).run() for seed in seeds(24)) > 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rough", [False, True])
+@pytest.mark.parametrize("first", range(1000, 2000, 250))
+def test_nothing_is_lost_in_many_cells(first: int, rough: bool) -> None:
+    assert sum(Session(seed, rough=rough).run() for seed in range(first, first + 250)) > 100
