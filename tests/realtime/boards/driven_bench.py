@@ -11,6 +11,7 @@ from detent.cell.outside import Store, no_store
 from detent.realtime.boards.dictionary import Value
 from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.fake.board import FakeBoard
+from detent.realtime.boards.fake.chips import Chip, Chips
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.frames import Reader, read_integer
@@ -22,7 +23,7 @@ from detent.realtime.boards.setup import Pin
 from detent.realtime.boards.states import News
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace
-from detent.ticks import MS, SECOND, US, Ns
+from detent.ticks import MS, NEVER, SECOND, US, Ns
 
 
 class Wire(FakePort):
@@ -78,6 +79,30 @@ class Wire(FakePort):
             super().send(data[gone:], later)
 
 
+class LoggedChip(Chip):
+    """A chip that keeps what was written to it: tick, register, value."""
+
+    def __init__(self, board: FakeBoard, address: int) -> None:
+        super().__init__(address)
+        self._board = board
+        self.log: list[tuple[int, int, int]] = []
+
+    def write(self, register: int, value: int) -> None:
+        self.log.append((self._board.now, register, value))
+        super().write(register, value)
+
+
+class LoggedChips(Chips):
+    """Those of a board."""
+
+    def __init__(self, board: FakeBoard) -> None:
+        super().__init__()
+        self._board = board
+
+    def get(self, wire: object, default: Any = None) -> Any:
+        return self.setdefault(wire, [LoggedChip(self._board, address) for address in range(4)])
+
+
 def no_file(name: str) -> str:
     raise FileNotFoundError(name)
 
@@ -113,10 +138,11 @@ class Bench:
         read: Callable[[str], str] = no_file,
         away: Callable[[bool], Ns] = lambda writing: 0,
         spare_exposed: bool = False,
+        chips: bool = False,
     ) -> None:
         """`away`: for how long the computer is elsewhere, at each look at its clock, and (True) within each write.
 
-        `spare_exposed`: not within one that has to come in time.
+        `spare_exposed`: not within one that has to come in time. `chips`: there are drivers, and they answer.
         """
         self.wall = 1_000 * SECOND
         self._away = away
@@ -133,6 +159,7 @@ class Bench:
             self.machines[name] = machine_of(described, self.plan, name, switches or {})
             fake = FakeBoard(self.machines[name], **{"moves": 400, **(board or {})})
             fake.kept_log = False
+            fake.chips = LoggedChips(fake) if chips else {}
             self.ports[name] = Wire(fake, lambda: self.look(True), lambda: self.wall, **(port or {}))
             self.ports[name].spare_exposed = spare_exposed
             return self.ports[name]
@@ -261,6 +288,28 @@ class Bench:
             found = self.machines[board].outputs[pin.name] is not pin.active_low
             [*_, (at, level)] = out.levels.before(out.levels.count)
             assert found is level, f"{out.name} is {found}, and {level} in the cell since {at / 1e9:.4f} s"
+
+    def check_drivers(self, *, late: bool) -> None:
+        """No step was made while the driver of its axis was switched off, or had half of its current.
+
+        But where its controller commands the current: then it has what was commanded last. `late`: the computer was
+        kept away between an output and steps that are due behind it; then some may have come before.
+        """
+        for ledger in self.driven.ledgers:
+            if ledger.what.half and (stage := ledger.stage_at(NEVER)) is not None:
+                holds, full = stage.settling > 0, max(stage.run, stage.hold) if stage.chops else 1.0
+                assert self.boards.outs[ledger.what.half].level is ((stage.hold if holds else stage.run) <= full / 2)
+            for name, active in ((ledger.what.enable, True), (ledger.what.half, False)):
+                if not name or (name == ledger.what.half and (late or ledger.stages.count)):
+                    continue
+                machine, pin = self.machines[ledger.what.board], self.boards.outs[name].setup.pin
+                changes = [
+                    (tick, level is not pin.active_low) for tick, where, level in machine.edges if where == pin.name
+                ]
+                for tick, axis, place in machine.steps:
+                    if axis == ledger.name:
+                        levels = [level for at, level in changes if at <= tick]
+                        assert levels[-1:] == [active], f"{axis} made a step to {place} at {tick} with {name} wrong"
 
     def position(self, stepper: str) -> int:
         """Where the motor is."""

@@ -123,6 +123,8 @@ class RandomCell:
         self.text += f'step = "{self._any(board)}"\ndir = "{self._any(board)}"\n'
         if self._random.random() < 0.6:
             self.text += f'enable = "{self._any(board)}"\n'
+        if self._random.random() < 0.3:
+            self.text += f'driver = {{ kind = "plain", half = "{self._any(board)}" }}\n'
 
     def _outputs(self, board: str, *names: str) -> None:
         chosen = [f'{name} = "{self._any(board)}"' for name in names if self._random.random() < 0.6]

@@ -1,9 +1,11 @@
 """The currents of driven motors: half at rest, and what becomes of an axis whose driver fails."""
 
+import pytest
 from tests.realtime.boards.driven_bench import Bench
 from tests.realtime.boards.test_driven import CELL, DCB, LEAD, levels
 
 from detent.realtime.boards.events import DriverFault
+from detent.realtime.boards.registers import CHOPCONF
 from detent.realtime.boards.states import Standing
 from detent.ticks import MS, SECOND, US
 
@@ -75,3 +77,75 @@ def test_a_driver_that_fails_in_mid_move_stops_its_axis() -> None:
         assert state.standing is Standing.FAULT
         assert state.shaft == after
         assert "too hot" in state.why
+
+
+@pytest.mark.parametrize("pause", [0, 1, 4, 9, 20, 40, 100])
+@pytest.mark.parametrize("lead", [5, 30, 60])
+def test_microsteps_change_between_two_motions(lead: int, pause: int) -> None:
+    """H of a DCB-274, from a host that waits for nothing: no step has those of the other motion."""
+    text = DCB.replace('serial = "fake"', f'serial = "fake"\nlead = "{lead} ms"')
+    with Bench(text + 'driver = { kind = "tmc2209", uart = "gpio20", sense = 0.05 }\n', chips=True) as bench:
+        bench.run(100 * MS)
+        bench.type("x", " ")
+        bench.run(300 * MS)
+        moved(bench, "+200")
+        bench.type("x", "H 3")
+        bench.type("x", "Y 10 20")
+        bench.run(pause * MS)
+        moved(bench, "+50")
+        bench.rest()
+        chip = bench.ports["b"].board.chips["gpio20"][0]
+        microsteps = [(tick, value) for tick, register, value in chip.log if register == CHOPCONF]
+        (_, before), (tick, now) = microsteps[-2:]
+        assert (before >> 24 & 15, now >> 24 & 15) == (6, 8)
+        steps = [at for at, _ in bench.edges("x")]
+        assert steps[199] < tick < steps[200]
+        state = bench.driven.axes()[0]
+        assert state.slips == 0
+        assert state.shaft == bench.position("x") == 250
+
+
+def moved(bench: Bench, line: str) -> None:
+    """A motion has begun and ended in the cell; its last steps have yet to leave."""
+    bench.type("x", line)
+    for moving in (True, False):
+        while bench.driven.axes()[0].moving is not moving:
+            bench.run(100 * US)
+
+
+def test_a_motor_that_ends_its_move_has_all_its_current_to_the_last_step() -> None:
+    """A GenStepper lets its motors have less at rest: here a lead later, and later still behind a slip."""
+    text = """
+[units.x]
+model = "bs0610"
+[boards.b]
+serial = "fake"
+lead = "60 ms"
+[hardware.x.X]
+board = "b"
+step = "gpio2"
+dir = "gpio3"
+unwired = ["LX-", "LX+"]
+driver = { kind = "plain", half = "gpio4" }
+[hardware.x.Y]
+board = "b"
+step = "gpio5"
+dir = "gpio6"
+unwired = ["LY-", "LY+"]
+"""
+    for stall in (0, 100 * MS):
+        with Bench(text) as bench:
+            bench.run(300 * MS)
+            bench.send("x", b"X300G")
+            bench.run(250 * MS)
+            bench.stall(stall)
+            bench.run(50 * MS)
+            bench.rest()
+            bench.run(500 * MS)
+            steps = bench.edges("x.X")
+            edges = [(tick, level) for tick, pin, level in bench.machines["b"].edges if pin == "gpio4"]
+            assert len(steps) == 300
+            assert [level for _, level in edges[-2:]] == [False, True]
+            assert edges[-2][0] < steps[0][0]
+            assert steps[-1][0] < edges[-1][0]
+            assert bool(bench.driven.axes()[0].slips) is bool(stall)

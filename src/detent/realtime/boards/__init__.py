@@ -19,11 +19,13 @@ the wall clock and give bytes, so the same code runs against the fake board in v
 | `ports` | a serial device, or the fake board |
 | `events` | what comes back |
 | `plan`, `opening`, `drive` | a cell file's tables to setups; boards opened and ready; what a service needs |
-| `driven` | the cell behind its pins, as the loop serves it; made of the three that follow |
-| `outgoing` | what the cell does, on its way out: `channels`, `ledger`; who watches (`guard`), what waits (`replies`) |
-| `rollback` | a stop takes the cell back (`past`), and the boards are told what is different |
-| `stages`, `checking` | what each power stage is told at first; a look at the wiring: inputs live, axes jogged |
-| `failures` | faults, emergency stop, recovery; `states` is how all of it stands, for those who look |
+| `driven` | the cell behind its pins, as the loop serves it; made of those that follow |
+| `outgoing` | what the cell does, on its way out: `channels`, `axis_ledger`, `guard` (who watches), `replies` |
+| `currents` | what each power stage is told, when the steps before it have left; `stages`: at first |
+| `incoming`, `rollback` | what comes from the boards; a stop takes the cell back (`past`), and they are told |
+| `cell_clock`, `cell_inputs`, `certainty` | its time, the inputs that it was given, what nothing can take back |
+| `faults` | faults, emergency stop, recovery; `states` is how all of it stands, for those who look |
+| `checking` | a look at the wiring: inputs live, axes jogged |
 
 **Time.** `wall` is always the host's monotonic clock in ns. Cell time is the board's time: `Boards.now` gives its
 nanoseconds, from which a `Pace` makes cell time. What the cell does at t leaves the pins at t + lead.

@@ -1,8 +1,9 @@
 """One driven axis within the cell that is driven: what it did, what it was told, whether it may move."""
 
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
+from detent.controllers.device import Stage
 from detent.realtime.boards.channels import Channel, alike
 from detent.realtime.boards.guard import Guard
 from detent.realtime.boards.plan import DrivenAxis
@@ -12,6 +13,14 @@ from detent.realtime.pace import WallNs
 from detent.ticks import NEVER, Ns
 
 Motion: TypeAlias = MotionStarted | MotionCut | MotionEnded
+PAST: Ns = -(1 << 62)  # before everything
+
+
+class Staged(NamedTuple):
+    """A power stage that was commanded, and the last pulse before that: it counts when that one has left the pins."""
+
+    behind: Ns
+    stage: Stage
 
 
 class AxisLedger:
@@ -20,6 +29,7 @@ class AxisLedger:
     def __init__(self, what: DrivenAxis, stepper: Stepper, guard: Guard, shaft: int) -> None:
         self.what, self.stepper, self.guard = what, stepper, guard
         self.motions: Channel[Motion] = Channel()
+        self.stages: Channel[Staged] = Channel()
         self.standing, self.why, self.known = Standing.WAITING, "", True
         self.lost = False  # its board was without supply, and no switch has stopped it since: nobody knows its place
         self.stops = 0
@@ -30,7 +40,6 @@ class AxisLedger:
             -1
         )  # no stop takes the cell back to before this time: the motor was elsewhere than the cell had it
         self.singles = 0  # so many times in a row a single pulse after the last time
-        self.rested: Ns | None = 0  # since when it is at rest; None while it moves
         self._shaft = shaft  # at rest
 
     @property
@@ -42,6 +51,14 @@ class AxisLedger:
     def motion(self) -> MotionStarted | None:
         """The motion under way."""
         return self.motion_after(self.motions.count)
+
+    @property
+    def rested(self) -> Ns | None:
+        """Since when the cell has it at rest; None while it moves."""
+        last = self.motions.before(self.motions.count)[-1:]
+        if not last:
+            return PAST
+        return None if isinstance(last[0], MotionStarted) else last[0].at
 
     def motion_after(self, count: int) -> MotionStarted | None:
         """The motion in force behind the first `count` entries."""
@@ -58,12 +75,39 @@ class AxisLedger:
     def take(self, entry: Motion) -> None:
         """The axis did this."""
         motion = self.motion
-        self.rested = None if isinstance(entry, MotionStarted) else entry.at
         if isinstance(entry, MotionStarted):
             self._shaft = entry.shaft
         elif motion is not None:
             self._shaft = motion.shaft + motion.direction * entry.last
         self.motions.append(entry)
+
+    def staged(self, at: Ns, stage: Stage) -> None:
+        """Its controller has commanded this at `at`."""
+        self.stages.append(Staged(self._last_pulse(at), stage))
+
+    def stage_at(self, now: Ns) -> Stage | None:
+        """What counts at its pins at cell time `now`; None: nothing was commanded."""
+        left = [staged.stage for staged in self.stages.since(0) if self.stepper.leaves(staged.behind, now) <= now]
+        return left[-1] if left else None
+
+    def staged_next(self, now: Ns) -> Ns:
+        """The cell time at which something else counts, as it looks at `now`; NEVER: nothing that was sent waits."""
+        times = [self.stepper.leaves(staged.behind, now) for staged in self.stages.since(0)]
+        return min((at for at in times if at > now), default=NEVER)
+
+    def _last_pulse(self, at: Ns) -> Ns:
+        """When it gave its last pulse up to `at`; PAST where none is kept."""
+        after: Motion | None = None
+        for motion in reversed(self.motions.since(0)):
+            if isinstance(motion, MotionStarted):
+                if after is None:
+                    last = _given(motion, at)
+                else:
+                    last = after.first - 1 if isinstance(after, MotionStarted) else after.last
+                if last >= motion.first:
+                    return motion.train.time_of(last)
+            after = motion
+        return PAST
 
     def take_back(self, count: int, shaft: int) -> list[Motion]:
         """Only the first `count` entries have happened, and the axis is at `shaft`; returned are the others."""

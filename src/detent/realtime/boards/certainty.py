@@ -51,6 +51,10 @@ class Certainty:
         sent = self._cell.now if due is None else min(due - 1, self._cell.now)
         return sent - self._plan.lead - ledger.stepper.behind(self._cell.now)
 
+    def told(self) -> Ns:
+        """What was to leave the pins up to this cell time has left them, or the boards have told that it did not."""
+        return self._cell.now - self._unheard()
+
     def _unheard(self) -> Ns:
         """How long ago a stop may have happened of which nothing was heard: what a late computer has yet to read."""
         heard = self._boards.heard()
@@ -60,7 +64,11 @@ class Certainty:
         """Whether a stop may yet take back what the cell does now."""
         return self.guarded or self._boards.heard() is not None
 
-    def inquire(self, first: Ns) -> None:
-        """Hear of what the boards did lately, where what the cell said first, at `first`, waits for nothing else."""
-        if self._plan.held and first <= self._cell.now - self.behind and first > self.horizon():
+    def inquire(self, first: Ns, staged: Ns) -> None:
+        """Hear of what the boards did lately, where something waits for nothing else.
+
+        What the cell said first, at `first`, or a power stage that counts when the pins are at cell time `staged`.
+        """
+        said = self._plan.held and first <= self._cell.now - self.behind and first > self.horizon()
+        if said or self.told() < staged <= self._cell.now:
             self._boards.inquire(self._wall())

@@ -1,45 +1,75 @@
-"""The currents of driven motors: what a controller commands of its power stage, on its way to a driver or a pin."""
+"""The currents of driven motors: what a controller commands of its power stage, on its way to a driver or a pin.
+
+It counts for the steps behind it: it is told when those before have left the pins, a lead later, and at once at rest.
+"""
 
 from collections.abc import Callable, Iterable
 
-from detent.cell.cell import Cell
-from detent.controllers.device import DriveSet, Stage, StageSet
+from detent.controllers.device import Stage
 from detent.realtime.boards.axis_ledger import AxisLedger
 from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.setup import SetupProblem
 from detent.realtime.boards.states import Standing, Weight
+from detent.ticks import MS, NEVER, Ns
+
+SETTING: Ns = 25 * MS  # what a chip takes at most to be told of other microsteps: five registers, and a batch before
 
 
 class Currents:
     """Of all driven axes. `say` tells people, `refused` is told of an axis whose driver cannot do what is commanded."""
 
-    def __init__(self, cell: Cell, boards: Boards, plan: Plan, say: Callable[[Weight, str], None]) -> None:
-        self._cell, self._boards, self._plan, self._say = cell, boards, plan, say
+    def __init__(self, boards: Boards, plan: Plan, told: Callable[[], Ns], say: Callable[[Weight, str], None]) -> None:
+        """`told`: the cell time up to which everything is known of the pins."""
+        self._boards, self._plan, self._told, self._say = boards, plan, told, say
         self.refused: Callable[[AxisLedger, str], None] = lambda ledger, why: None
-        self._stages: dict[str, Stage] = {}
+        self._stages: dict[str, Stage] = {}  # as drivers were told
+        self.next: Ns = NEVER  # something else counts when the pins are at this cell time
         self._halved: dict[str, bool] = {}  # whether a plain driver is told to give half of its current
 
-    def begin(self, ledger: AxisLedger) -> None:
-        """Its driver has what the cell file says."""
-        if ledger.what.stage is not None:
-            self._stages[ledger.name] = ledger.what.stage
-            self.command(ledger)
-
-    def staged(self, ledgers: Iterable[AxisLedger], entry: StageSet | DriveSet) -> None:
-        """A unit, whose axes are `ledgers`, has commanded something of a power stage."""
-        stage = entry.stage if isinstance(entry, StageSet) else getattr(entry.drive, "stage", None)
-        for ledger in ledgers:
-            if ledger.what.axis == entry.axis and stage is not None and self._stages.get(ledger.name) != stage:
-                self._stages[ledger.name] = stage
-                self.command(ledger)
-
-    def command(self, ledger: AxisLedger) -> None:
-        """Tell the driver of an axis its current, whatever it was told before."""
+    def begin_again(self, ledger: AxisLedger) -> None:
+        """Its driver has what the board gave it: whatever it was told before is told once more."""
+        self._stages.pop(ledger.name, None)
         self._halved.pop(ledger.name, None)
-        stage = self._stages.get(ledger.name)
-        if stage is None or not ledger.what.driver:
+
+    def follow(self, ledgers: Iterable[AxisLedger]) -> bool:
+        """Tell the drivers what counts at the pins by now. Whether any was told something new."""
+        told = False
+        for ledger in ledgers:
+            if ledger.what.driver:
+                told = self._command(ledger) or told
+            if ledger.what.half and ledger.standing is not Standing.FAULT:
+                told = self._halve(ledger) or told
+        return told
+
+    def hold(self, ledger: AxisLedger) -> None:
+        """A motion begins: it waits for its driver, where that makes other microsteps behind the steps before it."""
+        if not ledger.what.driver or not ledger.stages.count:
             return
+        newest, before = ledger.stages.since(0)[-1], self._stage(ledger)
+        if before is not None and (newest.stage.sequence, newest.stage.places) != (before.sequence, before.places):
+            ledger.stepper.wait_behind(newest.behind, SETTING)
+
+    def look(self, ledgers: Iterable[AxisLedger]) -> None:
+        """Find `next`."""
+        staged = [ledger for ledger in ledgers if ledger.stages.count]
+        told = self._told() if staged else 0
+        self.next = min((ledger.staged_next(told) for ledger in staged), default=NEVER)
+
+    @property
+    def due(self) -> bool:
+        """Whether something else counts since `look`."""
+        return self.next < NEVER and self.next <= self._told()
+
+    def _stage(self, ledger: AxisLedger) -> Stage | None:
+        return ledger.stage_at(self._told()) or ledger.what.stage
+
+    def _command(self, ledger: AxisLedger) -> bool:
+        """Tell the driver chip of an axis its currents and microsteps, if they are others than before."""
+        stage = self._stage(ledger)
+        if stage is None or self._stages.get(ledger.name) == stage:
+            return False
+        self._stages[ledger.name] = stage
         driver = self._boards.drivers[ledger.what.driver]
         asked, most = max(stage.run, stage.hold), driver.setup.amperes
         if stage.chops and most is not None and asked > most and ledger.limited != asked:
@@ -50,28 +80,20 @@ class Currents:
             driver.command(stage)
         except SetupProblem as problem:
             self.refused(ledger, str(self._plan.problem(problem)))
+        return True
 
-    def halve(self, ledgers: Iterable[AxisLedger]) -> bool:
-        """Tell plain drivers whether half of the current is enough: from before the first step to behind the last.
-
-        Whether any was told something new.
-        """
-        now, told = self._cell.now, False
-        for ledger in ledgers:
-            if not ledger.what.half or ledger.standing is Standing.FAULT:
-                continue
-            stage = self._stages.get(ledger.name)
-            over = ledger.rested is not None and now >= ledger.rested + self._plan.lead + ledger.stepper.behind(now)
-            if stage is None:
-                half = over
-            else:
-                holds = (
-                    over and stage.settling > 0 and ledger.rested is not None and now >= ledger.rested + stage.settling
-                )
-                full = max(stage.run, stage.hold) if stage.chops else 1.0
-                half = (stage.hold if holds else stage.run) <= full / 2
-            if self._halved.get(ledger.name) is not half:
-                self._halved[ledger.name] = half
-                self._boards.outs[ledger.what.half].now(half)
-                told = True
-        return told
+    def _halve(self, ledger: AxisLedger) -> bool:
+        """Tell a plain driver whether half of its current is enough: from before the first step to behind the last."""
+        stage, now, rested = self._stage(ledger), self._told(), ledger.rested
+        over = NEVER if rested is None else ledger.stepper.leaves(rested, now)
+        if stage is None:
+            half = over <= now
+        else:
+            holds = stage.settling > 0 and over + stage.settling <= now
+            full = max(stage.run, stage.hold) if stage.chops else 1.0
+            half = (stage.hold if holds else stage.run) <= full / 2
+        if self._halved.get(ledger.name) is half:
+            return False
+        self._halved[ledger.name] = half
+        self._boards.outs[ledger.what.half].now(half)
+        return True

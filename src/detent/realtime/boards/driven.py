@@ -156,17 +156,25 @@ class Driven:
         if self.outgoing.pending:
             times.append(self.outgoing.committed + self.boards.batch)
         at = clock + min(times) - wall if times else None
-        tail = min((ledger.guard.next for ledger in self.ledgers), default=NEVER)
-        first = self.outgoing.held_since
-        if min(tail, first) == NEVER:
-            return at
-        behind = self.outgoing.certainty.behind  # what was said and stored before that is certain
-        if first + behind <= self.cell.now and self.outgoing.certainty.horizon() < first:
-            first = self.cell.now + self.boards.batch - behind  # the boards were asked, and what they answer wakes it
-        cell = min(tail, first) + behind
+        self.outgoing.currents.look(self.ledgers)
+        staged = self.outgoing.currents.next
+        if staged <= self.cell.now:  # the boards were asked, and what they answer wakes it
+            staged = self.cell.now + self.boards.batch
+        cell = min(self._certain_at(), staged)
         if cell < NEVER:
             at = cell + self.outgoing.clock.offset if at is None else min(at, cell + self.outgoing.clock.offset)
         return at
+
+    def _certain_at(self) -> Ns:
+        """The cell time at which something that waits to be certain may be so; NEVER: nothing waits."""
+        tail = min((ledger.guard.next for ledger in self.ledgers), default=NEVER)
+        first = self.outgoing.held_since
+        if min(tail, first) == NEVER:
+            return NEVER
+        behind = self.outgoing.certainty.behind  # what was said and stored before that is certain
+        if first + behind <= self.cell.now and self.outgoing.certainty.horizon() < first:
+            first = self.cell.now + self.boards.batch - behind  # the boards were asked, and what they answer wakes it
+        return min(tail, first) + behind
 
     def serve(self) -> None:
         """The cell is at its present: deal with what came from the boards, and give them what is certain."""
@@ -181,9 +189,9 @@ class Driven:
             self._incoming.happened(event)
         if events:
             self.outgoing.absorb()
-        self.outgoing.certainty.inquire(self.outgoing.held_since)
+        self.outgoing.certainty.inquire(self.outgoing.held_since, self.outgoing.currents.next)
         over = self.outgoing.stores.first < NEVER and self.outgoing.stores.first <= self.outgoing.certainty.horizon()
-        if events or over or wall - self._looked >= self.boards.batch:
+        if events or over or self.outgoing.currents.due or wall - self._looked >= self.boards.batch:
             self._looked = wall
             self._look()
         if (
@@ -198,7 +206,7 @@ class Driven:
     def _look(self) -> None:
         """What is over by now, and what is certain; and whether all is as it should be."""
         self.outgoing.refresh()
-        if self.outgoing.currents.halve(self.ledgers):
+        if self.outgoing.currents.follow(self.ledgers):
             self.outgoing.pending = True
         self.rollback.not_stopped()
         self._prove()
@@ -248,6 +256,8 @@ class Driven:
             out.levels.forget(next(counts))
         for _ in self.lines:
             next(counts)
+        for ledger in self.ledgers:
+            ledger.stages.forget(next(counts))
         self.outgoing.stores.forget(next(counts))
 
     def halt(self) -> None:

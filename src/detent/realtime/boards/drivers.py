@@ -106,6 +106,7 @@ class Driver:
         self.name, self.setup = setup.name, setup
         self._core, self._wire = core, wire
         self._wanted: Sequence[Written] | None = None
+        self._has: dict[int, int] = {}  # register: value, of those that it has for sure
         self._fresh = False  # `_wanted` has not been written
         self._busy = self._ready = False
         self._failed = False  # what it has is not what it was told
@@ -124,6 +125,7 @@ class Driver:
     def began(self) -> None:
         """The board is ready; the chip may have been without power: it is set again."""
         self._ready, self._busy = True, False
+        self._has.clear()
         self._fresh = self._wanted is not None
 
     def shut_down(self) -> None:
@@ -179,6 +181,7 @@ class Driver:
 
     def _fail(self, reason: str) -> None:
         self._busy, self._failed = False, True
+        self._has.clear()
         self._core.events.append(DriverFault(self._core.setup.name, self.name, reason))
 
     @property
@@ -187,8 +190,15 @@ class Driver:
         return self._fresh and self._ready and not self._busy
 
     def _write(self, left: int, wall: WallNs) -> None:
+        """Only what is new: each register takes a chip on a UART 2 ms, and steps may follow soon."""
         assert self._wanted is not None
-        (self._by_uart if self.setup.uart is not None else self._by_spi)(tuple(self._wanted), left, wall)
+        wanted = tuple(entry for entry in self._wanted if self._has.get(entry.register) != entry.value)
+        for entry in wanted:
+            self._has.pop(entry.register, None)
+        if wanted:
+            (self._by_uart if self.setup.uart is not None else self._by_spi)(wanted, left, wall)
+        else:
+            self._busy, self._look_at = False, wall + LOOK_EVERY
 
     def _by_uart(self, wanted: Sequence[Written], left: int, wall: WallNs) -> None:
         address = self.setup.address
@@ -219,7 +229,7 @@ class Driver:
         for entry in wanted:
             data = bytes((entry.register | 0x80,)) + entry.value.to_bytes(4, "big")
             self._wire.exchange(data, 5, lambda *_: None, wall)
-        readable = [entry for entry in wanted if entry.register in (GCONF, CHOPCONF)]
+        readable = [entry for entry in self._wanted or () if entry.register in (GCONF, CHOPCONF)]
         wrong: list[str] = []
         silent: list[bool] = []
         for entry in readable:
@@ -255,6 +265,7 @@ class Driver:
 
     def _done(self, wanted: Sequence[Written], wall: WallNs) -> None:
         self._busy = self._failed = False
+        self._has.update((entry.register, entry.value) for entry in wanted)
         self._look_at = wall + LOOK_EVERY
         what = ", ".join(f"{entry.name} {entry.value:08X}h" for entry in wanted)
         self._core.events.append(DriverSet(self._core.setup.name, self.name, what))

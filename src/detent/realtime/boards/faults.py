@@ -125,7 +125,7 @@ class Faults:
         for out in self._outgoing.outs.values():
             if out.name == ledger.what.enable:  # it was withheld
                 self._outgoing.set_now(out)
-        self._outgoing.currents.command(ledger)
+        self._outgoing.currents.begin_again(ledger)
         self._outgoing.pending = True
 
     def _not_written(self, unit: str) -> None:

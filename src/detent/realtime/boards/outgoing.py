@@ -76,7 +76,7 @@ class Outgoing:
         self.clock = CellClock(boards, wall)
         self.inputs = CellInputs(cell, plan)
         self.certainty = Certainty(cell, boards, plan, self.ledgers, wall)
-        self.currents = Currents(cell, boards, plan, self.say)
+        self.currents = Currents(boards, plan, self.certainty.told, self.say)
         self.lines = [HeldLine(cell, number, self._telling) for number in range(len(cell.lines))]
         self.past = Past(cell, self._counts)
         self.committed: WallNs = 0
@@ -92,7 +92,6 @@ class Outgoing:
         for ledger in self.ledgers:
             ledger.stepper.adopt(ledger.shaft_at(self.cell.now))
             ledger.standing = Standing.DRIVEN
-            self.currents.begin(ledger)
         for unit, pin in self.outs:
             self._level(unit, pin, False, self.cell.now)  # until the recording tells better
         self.absorb()
@@ -122,6 +121,7 @@ class Outgoing:
             *(ledger.motions.count for ledger in self.ledgers),
             *(out.levels.count for out in self.outs.values()),
             *(line.count for line in self.lines),
+            *(ledger.stages.count for ledger in self.ledgers),
             self.stores.count,
         )
 
@@ -166,6 +166,8 @@ class Outgoing:
                             found = True
                             if tell and ledger.standing is not Standing.FAULT:
                                 ledger.stepper.tell(entry)
+                                if isinstance(entry, MotionStarted) and entry.first == 1:
+                                    self.currents.hold(ledger)
                 elif isinstance(entry, Displaced):
                     for ledger in ledgers or ():
                         if ledger.what.axis == entry.axis:
@@ -178,7 +180,9 @@ class Outgoing:
                     self._powered(unit, entry, tell=tell)
                     found = True
                 elif isinstance(entry, (StageSet, DriveSet)):
-                    self.currents.staged(self.of_unit(unit), entry)
+                    for ledger in ledgers or ():
+                        if ledger.what.axis == entry.axis:
+                            ledger.staged(entry.at, entry.stage if isinstance(entry, StageSet) else entry.drive.stage)
             found = found or ledgers is not None
         return found
 

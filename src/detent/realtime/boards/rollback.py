@@ -1,11 +1,12 @@
 """A stop in the firmware takes the cell back to where it happened, and the boards are told what is different since."""
 
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
 from detent.cell.actions import Action, TimedAction
 from detent.cell.recording import Batch
-from detent.controllers.device import Powered
+from detent.controllers.device import DriveSet, Powered, StageSet
 from detent.lines.line import Heard
 from detent.pins import Level, PinSet
 from detent.realtime.boards.axis_ledger import AxisLedger, Motion
@@ -19,6 +20,7 @@ from detent.realtime.pace import WallNs
 from detent.ticks import MS, Ns
 
 AWAITED: Ns = 100 * MS  # reports of a trigger come every 25 ms
+AxisNews: TypeAlias = Motion | StageSet | DriveSet
 MOST_SINGLES = 8  # pulses in a row that an input stops one by one
 
 
@@ -130,12 +132,7 @@ class Rollback:
             batches = self._outgoing.batches()
             ahead = list(moment.counts)
             for place, ledger in enumerate(self._ledgers):
-                ahead[place] += sum(
-                    isinstance(entry, (MotionStarted, MotionCut, MotionEnded)) and entry.axis == ledger.what.axis
-                    for unit, entries in batches
-                    if ledger in self._outgoing.of_unit(unit)
-                    for entry in entries
-                )
+                ahead[place] += self._told(batches, ledger, MotionStarted, MotionCut, MotionEnded)
             counts.extend(ahead[: len(self._ledgers)])
             for ledger, count in zip(self._ledgers, counts, strict=True):
                 before = ledger.motions.before(count)
@@ -151,6 +148,9 @@ class Rollback:
             for number in range(len(self._outgoing.lines)):
                 heard = self._cell.lines[number].take()
                 counts.append(moment.counts[place] + len(heard))
+                place += 1
+            for ledger in self._ledgers:
+                ledger.stages.cut(moment.counts[place] + self._told(batches, ledger, StageSet, DriveSet))
                 place += 1
             self._outgoing.stores.cut()
             if event.dry:  # nothing is different from there on: what was armed is armed
@@ -188,6 +188,15 @@ class Rollback:
         for out in self._outgoing.outs.values():
             self._tell_out(out, levels[out.name], places[out.name], at, stopped)
         self._outgoing.pending = True
+
+    def _told(self, batches: Sequence[Batch], ledger: AxisLedger, *kinds: type[AxisNews]) -> int:
+        """How many entries of these kinds tell of an axis."""
+        return sum(
+            isinstance(entry, kinds) and entry.axis == ledger.what.axis
+            for unit, entries in batches
+            if ledger in self._outgoing.of_unit(unit)
+            for entry in entries
+        )
 
     def _levels_in(self, batches: Sequence[Batch], out: Out) -> int:
         """How many items of the channel of an output these entries make."""

@@ -19,7 +19,7 @@ from detent.realtime.boards.lag import SETTLED, Lag, Late
 from detent.realtime.boards.setup import StepperSetup
 from detent.realtime.boards.undo import Undo
 from detent.realtime.pace import WallNs
-from detent.ticks import MS, SECOND, Ns
+from detent.ticks import MS, NEVER, SECOND, Ns
 
 LONGEST = 64  # steps of a run: looking further ahead costs more than it saves where a commit cuts runs anyway
 NOWHERE = -(1 << 62)  # before everything: the first run gets a base of its own
@@ -77,6 +77,7 @@ class Stepper:
         self.shares(self.of)
         self._own: Ns = 0  # lag beyond that of its unit
         self._trail: tuple[Ns, Ns] = 0, 0  # the last pulse that came with an earlier lag, and that lag
+        self._sooner: tuple[Ns, Ns] = 0, 0  # the last pulse that was sent before the lag grew last, and that lag
         self._through: tuple[Train, int] | None = None  # the last pulse sent
         self._core = core
         sign = -1 if setup.dir.active_low and setup.minus is None else 1
@@ -155,6 +156,17 @@ class Stepper:
         through, earlier = self._trail
         return max(self.lag, earlier) if now <= through + self._core.setup.lead + earlier else self.lag
 
+    def leaves(self, at: Ns, now: Ns) -> Ns:
+        """The cell time at which its pulses up to `at` have left the pins, as it looks at cell time `now`.
+
+        What was sent before the lag grew leaves sooner than what comes later since. NEVER: they have to be sent first.
+        """
+        due = self.next_pulse()
+        if due is not None and due <= at:
+            return NEVER
+        through, lag = self._sooner
+        return at + self._core.setup.lead + (min(lag, self.behind(now)) if at <= through else self.behind(now))
+
     def lag_at(self, tick: int) -> int:
         """The lag, in ticks, of a pulse that was on its way at `tick`."""
         core = self._core
@@ -169,6 +181,10 @@ class Stepper:
 
     def delayed(self, at: Ns, by: Ns, *, slip: bool, own: bool) -> None:
         """From cell time `at` on it comes later by so much more; `own`: it alone, and not its unit."""
+        if self.told_through is not None:
+            through = min(self.told_through, (self.next_pulse() or NEVER) - 1)  # what was not made comes later, too
+            if through != self._sooner[0]:
+                self._sooner = through, self.lag - (0 if own else by)
         if own:
             self._own += by
         self._core.events.append((Slipped if slip else Later)(self.board, self.name, at, by))
@@ -280,6 +296,7 @@ class Stepper:
         self._told = self._sent = shaft
         self._halted = self._stopped = False
         self._regaining, self.dried = not slipped, False
+        self._sooner = 0, 0  # some of what was sent then may not have been made
         self._proved, self._doubted = False, None
 
     def next_pulse(self) -> Ns | None:
@@ -443,6 +460,10 @@ class Stepper:
         self._not_before = max(self._not_before, tick)
         if self._spans:
             self._spans[-1].not_before = self._not_before
+
+    def wait_behind(self, at: Ns, span: Ns) -> None:
+        """No pulse of the newest motion until `span` after what the axis did at cell time `at` has left."""
+        self.not_before(self.tick(at) + self._core.ticks(span))
 
     # -- what the firmware does
 
