@@ -61,6 +61,35 @@ def test_outputs_change_with_the_pulses_they_belong_to() -> None:
         assert [level for _, level in levels(bench, "gpio7")][-2:] == [True, False]
 
 
+@pytest.mark.parametrize("pause", [1, 60, 100, 118, 122, 150, 400])
+@pytest.mark.parametrize("ahead", [1, 60, 119, 125])
+def test_behind_a_slip_outputs_and_steps_keep_their_order_and_distance(pause: int, ahead: int) -> None:
+    """A brake that is let go before a motion is let go before it on the pins, too, and by as much."""
+    with Bench(CELL) as bench:
+        bench.driven._forget = lambda: None  # type: ignore[method-assign]
+        bench.run(100 * MS)
+        bench.type("x", "+150")
+        bench.run(60 * MS)
+        bench.stall(120 * MS)
+        while bench.driven.axes()[0].moving:
+            bench.run(100 * US)
+        assert bench.driven.axes()[0].slips == 1
+        bench.run(pause * MS)
+        bench.type("x", "A1")
+        bench.run(ahead * MS)
+        bench.type("x", "+10")
+        bench.run(200 * MS)
+        bench.rest()
+        assert bench.driven.axes()[0].slips == 1
+        [ledger] = bench.driven.ledgers
+        [changed] = [at for at, level in bench.driven.outgoing.outs[0, "UO1"].levels.since(0) if level]
+        begun = pulses(ledger.motions.since(0), bench.cell.now)[150][0]
+        [(released, _)] = [pair for pair in levels(bench, "gpio8") if pair[1]][-1:]
+        scale = bench.boards.boards["b"].core.scale
+        first = scale.time(bench.edges("x")[150][0])
+        assert abs((first - released) - (begun - changed)) < 60 * US
+
+
 def test_inputs_are_read_before_the_unit_is_switched_on() -> None:
     """With REC low the module homes at power-on ("Recall"): both switches closed, it is done without a step."""
     text = CELL.replace('CHS = "low"', 'CHS = "low", REC = "low"')

@@ -1,8 +1,9 @@
 """How much later than the lead the axes of a unit come: one time for all of them, so that they stay together.
 
-It grows where a batch is late (a slip), for every axis of the unit alike, and is 0 again behind a rest of all of them
-that is long enough. What a single axis needs beyond that, because a cell that was taken back gives its pulses too late,
-is its own affair while others move: a hole in their pulses would cost them steps.
+It grows where a batch is late (a slip), for every axis of the unit alike, and its outputs come later with them, so that
+order and distances stay as they are. It is 0 again behind a rest that is long enough, of all axes and of the outputs.
+What a single axis needs beyond that, because a cell that was taken back gives its pulses too late, is its own affair
+while others move: a hole in their pulses would cost them steps.
 """
 
 from collections.abc import Iterable, Sequence
@@ -60,6 +61,7 @@ class Lag:
         self.now: Ns = 0
         self.slips = 0
         self.slipped: Ns = 0
+        self._changed: Ns | None = None  # when an output changed last, by cell time
 
     @property
     def waits(self) -> bool:
@@ -68,12 +70,22 @@ class Lag:
 
     def rested(self, first: Ns, now: Ns) -> None:
         """At cell time `now` an axis begins to move, its first pulse at `first`: all of them may have been at rest."""
-        if self.now and self._still(self.axes):
-            through = [axis.told_through for axis in self.axes if axis.told_through is not None]
-            if not through or first - max(through) > max(axis.lag for axis in self.axes) + SETTLED:
-                for axis in self.axes:
-                    axis.caught_up(now)
-                self.now = 0
+        late = any(axis.lag for axis in self.axes)
+        if late and self._still(self.axes) and all(self.settled(first, axis) for axis in self.axes):
+            for axis in self.axes:
+                axis.caught_up(now)
+            self.now = 0
+
+    def settled(self, first: Ns, axis: Axis) -> bool:
+        """Whether what comes at cell time `first` may be in time again: axis and outputs rested for long enough."""
+        last = max((at for at in (axis.told_through, self._changed) if at is not None), default=None)
+        return last is None or first - last > axis.lag + SETTLED
+
+    def changed(self, at: Ns) -> Ns:
+        """An output of the unit changes at cell time `at`: by how much later than the lead it does."""
+        self.rested(at, at)
+        self._changed = at if self._changed is None else max(at, self._changed)
+        return max(axis.lag for axis in self.axes)
 
     def forget(self) -> None:
         """Nothing is under way that was later, as far as its axes are all at rest."""

@@ -214,8 +214,8 @@ class Outgoing:
         """An output takes a level at cell time `at`."""
         if self._withheld(out):
             return
-        lag = max((ledger.stepper.lag for ledger in self._of_unit.get(out.unit, ())), default=0)
-        self.boards.outs[out.name].set(level, at, lag)
+        ledgers = self._of_unit.get(out.unit)
+        self.boards.outs[out.name].set(level, at, ledgers[0].stepper.of.changed(at) if ledgers else 0)
         self.pending = True
 
     def set_anew(self, out: Out, count: int, at: Ns) -> None:

@@ -15,7 +15,7 @@ from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.count import Count
 from detent.realtime.boards.dictionary import Message, Value
 from detent.realtime.boards.events import CountDiffers, CountEnds, Later, Slipped
-from detent.realtime.boards.lag import SETTLED, Lag, Late
+from detent.realtime.boards.lag import Lag, Late
 from detent.realtime.boards.setup import StepperSetup
 from detent.realtime.boards.undo import Undo
 from detent.realtime.pace import WallNs
@@ -256,7 +256,7 @@ class Stepper:
             return
         first = train.time_of(1)
         self.of.rested(first, now)
-        if self._own and (self.told_through is None or first - self.told_through > self.lag + SETTLED):
+        if self._own and self.of.settled(first, self):
             self.caught_up(now)
 
     def over(self, wall: WallNs) -> bool:
