@@ -1,6 +1,7 @@
 """A cell behind fake boards, served by the loop itself in virtual time; and the same cell with ideal switches."""
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 from detent.axis import MotionCut, MotionEnded, MotionStarted
@@ -289,6 +290,22 @@ class Bench:
             [*_, (at, level)] = out.levels.before(out.levels.count)
             assert found is level, f"{out.name} is {found}, and {level} in the cell since {at / 1e9:.4f} s"
 
+    def check_levels(self) -> None:
+        """Every output did what it did in the cell, and nothing else.
+
+        Where no stop took anything back. The bench has kept all (`keep`).
+        """
+        for out in self.driven.outgoing.outs.values():
+            board = next(name for name, board in self.boards.boards.items() if out.name in board.outs)
+            setup, edges = self.boards.outs[out.name].setup, self.machines[board].edges
+            found = [level is not setup.pin.active_low for _, pin, level in edges if pin == setup.pin.name]
+            wanted = [setup.initial, *(level for _, level in out.levels.since(1))]
+            assert found == [level for level, _ in groupby(wanted)], out.name
+
+    def keep(self) -> None:
+        """Nothing is forgotten of what the cell did."""
+        self.driven._forget = lambda: None  # type: ignore[method-assign]
+
     def check_drivers(self, *, late: bool) -> None:
         """No step was made while the driver of its axis was switched off, or had half of its current.
 
@@ -308,7 +325,10 @@ class Bench:
                 ]
                 for tick, axis, place in machine.steps:
                     if axis == ledger.name:
-                        levels = [level for at, level in changes if at <= tick]
+                        error = 60 * US * self.boards.boards[ledger.what.board].frequency // SECOND
+                        levels = [level for at, level in changes if at <= tick - error] + [
+                            level for at, level in changes if abs(at - tick) < error and level is active
+                        ]
                         assert levels[-1:] == [active], f"{axis} made a step to {place} at {tick} with {name} wrong"
 
     def position(self, stepper: str) -> int:

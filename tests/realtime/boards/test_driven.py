@@ -90,6 +90,34 @@ def test_behind_a_slip_outputs_and_steps_keep_their_order_and_distance(pause: in
         assert abs((first - released) - (begun - changed)) < 60 * US
 
 
+def test_outputs_come_up_as_the_cell_has_them_without_a_glitch() -> None:
+    with Bench(CELL) as bench:
+        bench.run(200 * MS)
+        assert [level for _, level in levels(bench, "gpio7")] == [False], "RDY, active low"
+        assert [level for _, level in levels(bench, "gpio6")] == [False]
+        assert [level for _, level in levels(bench, "gpio4")] == [True, False], "switched on, active low"
+
+
+@pytest.mark.parametrize("begins", range(90, 140, 5))
+def test_an_output_that_is_late_behind_steps_in_time_is_told(begins: int) -> None:
+    """It was not given to the board with them, as a stop might have taken it back; a slip moves both."""
+    text = CELL.replace("outputs = { MOV", 'outputs = { RAMP = "gpio9", MOV')
+    with Bench(text) as bench:
+        bench.keep()
+        bench.run(100 * MS)
+        bench.type("x", "+400")
+        bench.run(begins * MS)
+        bench.stall(18 * MS)
+        bench.rest()
+        out = bench.driven.outgoing.outs[0, "RAMP"]
+        scale = bench.boards.boards["b"].core.scale
+        found = [(scale.time(tick), level) for tick, pin, level in bench.machines["b"].edges if pin == "gpio9"]
+        late = [came - at for (came, _), (at, _) in zip(found[1:], out.levels.since(2), strict=True)]
+        told = [news.text for news in bench.news if "x.RAMP changed" in news.text]
+        assert bench.driven.axes()[0].slips == 0
+        assert sum(by > MS for by in late) == len(told)
+
+
 def test_inputs_are_read_before_the_unit_is_switched_on() -> None:
     """With REC low the module homes at power-on ("Recall"): both switches closed, it is done without a step."""
     text = CELL.replace('CHS = "low"', 'CHS = "low", REC = "low"')

@@ -1,13 +1,14 @@
 """Outputs: a change comes at its tick, is held back while it can still be taken back, and corrected where it cannot."""
 
+from dataclasses import replace
 from random import Random
 
 import pytest
 from tests.generated import seeds
-from tests.realtime.boards.bench import Bench, bench
+from tests.realtime.boards.bench import MOV, SLIDE, Bench, bench
 
 from detent.ramps import constant_acceleration
-from detent.realtime.boards.events import ShutDown
+from detent.realtime.boards.events import ShutDown, Slipped
 from detent.realtime.boards.setup import OutSetup, Pin
 from detent.ticks import MS, SECOND, Ns
 
@@ -131,6 +132,22 @@ def test_a_late_change_is_made_at_once() -> None:
     made.run(50 * MS)
     assert made.machine.outputs["gpio6"] is True
     assert made.boards.ready
+
+
+@pytest.mark.parametrize("kept_away", [40, 100])
+def test_a_pulse_keeps_its_width_where_the_computer_was_away(kept_away: int) -> None:
+    """At rest: what follows comes later, too; before, both edges came at once."""
+    made = bench(steppers=(replace(SLIDE, unit="x"),), outs=(replace(MOV, unit="x"),))
+    at = made.now
+    made.turn(made.wall + kept_away * MS)
+    for n in range(3):
+        made.boards.outs["MOV"].set(n % 2 == 0, at + MS + 4 * n * MS)
+    made.run(200 * MS)
+    (first, _), *_ = found = changes(made)
+    assert [(time - first, level) for time, level in found] == [(0, True), (4000, False), (8000, True)]
+    slips = [event.by for event in made.of(Slipped)]
+    assert len(slips) == (kept_away > 30)
+    assert first == pytest.approx(1000 + sum(slips) / 1000, abs=2)
 
 
 def test_now() -> None:

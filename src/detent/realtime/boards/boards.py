@@ -69,6 +69,9 @@ class Boards:
         for stepper in self.steppers.values():
             if stepper.setup.unit:
                 stepper.shares(lags.setdefault(stepper.setup.unit, stepper.of))
+        for out in self.outs.values():
+            if out.setup.unit in lags:
+                out.shares(lags[out.setup.unit])
         self.master = self._pairs[0][0]
         self.lead: Ns = self.master.setup.lead
         self.batch: WallNs = self.master.setup.batch

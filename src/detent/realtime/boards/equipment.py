@@ -2,7 +2,7 @@
 
 import json
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import heapify, heappop, heapreplace
 
 from detent.realtime.boards.core import Core
@@ -134,6 +134,9 @@ class Equipment:
         Whether an output waits until stops were heard of.
         """
         waits, heard = False, self.heard()
+        settle(self.steppers.values(), now, wall)  # outputs come later with the steps
+        for lag in self._lags:
+            lag.settle_outputs(wall, heard)
         for out in self.outs.values():
             if out.wants(wall):
                 waits |= out.commit(wall, heard, firm)
@@ -152,6 +155,11 @@ class Equipment:
         for name, due in self._dues().items():
             self.stops[name].behind_steps(due, wall)
         return waits
+
+    @property
+    def _lags(self) -> Iterable[Lag]:
+        """Of the units whose outputs are here."""
+        return {id(out.of): out.of for out in self.outs.values() if out.of is not None}.values()
 
     @property
     def renewing(self) -> int:
@@ -202,6 +210,7 @@ class Equipment:
                 changing.append(kept(stop))
                 changing.append(self.steppers[name].kept())
         changing += [kept(out) for out in self.outs.values() if out.wants(wall)]
+        changing += [kept(lag) for lag in self._lags]
         return together(changing)
 
     def deadlines(self) -> list[WallNs | None]:

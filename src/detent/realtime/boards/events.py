@@ -64,11 +64,11 @@ class Slipped(NamedTuple):
     by: Ns
 
 
-class Later(NamedTuple):
-    """The same, and nobody was late: behind a stop, or as a stop has to come into force first."""
+class OutputLate(NamedTuple):
+    """The change of an output for cell time `at` came later than its unit does, by so many ns, as the computer did."""
 
     board: str
-    stepper: str
+    out: str
     at: Ns
     by: Ns
 
@@ -146,6 +146,6 @@ class Refusal(NamedTuple):
 
 
 Event: TypeAlias = (
-    Ready | InputChanged | Stopped | Slipped | Later | CountDiffers | CountEnds | ShutDown | Recovered | Lost
-    | DriverFault | DriverSet | Refusal
+    Ready | InputChanged | Stopped | Slipped | OutputLate | CountDiffers | CountEnds | ShutDown | Recovered
+    | Lost | DriverFault | DriverSet | Refusal
 )  # fmt: skip

@@ -1,6 +1,5 @@
 """What comes from the boards: each event, and who deals with it."""
 
-from detent.realtime.boards.axis_ledger import AxisLedger
 from detent.realtime.boards.events import (
     BY_HAND,
     CountDiffers,
@@ -9,8 +8,8 @@ from detent.realtime.boards.events import (
     DriverSet,
     Event,
     InputChanged,
-    Later,
     Lost,
+    OutputLate,
     Ready,
     Recovered,
     Refusal,
@@ -23,7 +22,7 @@ from detent.realtime.boards.outgoing import Outgoing
 from detent.realtime.boards.rollback import Rollback
 from detent.realtime.boards.setup import SetupProblem
 from detent.realtime.boards.states import Standing, Weight
-from detent.ticks import Ns, show_duration
+from detent.ticks import show_duration
 
 
 class Incoming:
@@ -54,15 +53,14 @@ class Incoming:
                     self._faults.place(ledger, event.shaft)
                 for name, level in event.levels.items():  # they were asked for, and no report tells them again
                     self._found(name, level)
-            case Later(_, stepper, at, _):
-                self._later(self._by_stepper[stepper], at)
-            case Slipped(_, stepper, at, by):
+            case Slipped(_, stepper, _, by):
                 ledger = self._by_stepper[stepper]
-                self._later(ledger, at)
                 slips = ledger.stepper.slips
                 who = stepper if len(ledger.stepper.of.axes) == 1 else ledger.what.unit
                 what = f"{who} slipped by {show_duration(by)}: the computer was late; no step is lost"
                 self._outgoing.say(Weight.WARNING, f"{what} ({slips} {'slip' if slips == 1 else 'slips'} so far)")
+            case OutputLate(_, out, _, by):
+                self._outgoing.say(Weight.WARNING, f"{out} changed {show_duration(by)} late: the computer was late")
             case CountDiffers(_, stepper, shaft, counted):
                 ledger = self._by_stepper[stepper]
                 if ledger.standing is Standing.DRIVEN:
@@ -97,14 +95,6 @@ class Incoming:
                 self._faults.board_failed(board, str(problem))
             case Ready():
                 pass  # it was, before anything began
-
-    def _later(self, ledger: AxisLedger, at: Ns) -> None:
-        """Pulses from `at` on come later: so do the outputs of the unit."""
-        unit = self._outgoing.cell.unit(ledger.what.unit)
-        for out in self._outgoing.outs.values():
-            count = out.levels.count - sum(when > at for when, _ in out.levels.before(out.levels.count))
-            if out.unit == unit and count < out.levels.count:
-                self._outgoing.set_anew(out, count, at)
 
     def _found(self, name: str, level: bool) -> None:
         """An input has this level; the cell gets it, if it has another one."""

@@ -37,6 +37,10 @@ class Axis(Protocol):
         """Whether no pulse is to come."""
 
     @property
+    def under_way(self) -> bool:
+        """Whether a motion goes on of which pulses were sent."""
+
+    @property
     def lag(self) -> Ns:
         """That of its unit, and its own."""
 
@@ -49,15 +53,35 @@ class Axis(Protocol):
     def delayed(self, at: Ns, by: Ns, *, slip: bool, own: bool) -> None:
         """From cell time `at` on it comes later by so much more; `own`: it alone."""
 
+    def grew(self, before: Ns) -> None:
+        """Its lag was `before` for what it was sent."""
+
     def caught_up(self, now: Ns) -> None:
         """Its next pulse comes a lead behind the cell again."""
 
 
+class Output(Protocol):
+    """What a lag needs of an output."""
+
+    def delayed(self, at: Ns, by: Ns, wall: WallNs) -> None:
+        """What has yet to come, for cell time `at` or behind it, comes later by so much more."""
+
+    def late(self, wall: WallNs, heard: WallNs | None) -> tuple[Ns, Ns] | None:
+        """The cell time of its next change, and by how much it is late, if a late computer is to blame.
+
+        None, too, where a stop that was not heard of yet (up to `heard`) may take it back.
+        """
+
+
 class Lag:
-    """The lag of the `axes` of a unit, on one board or several. `slips` and `slipped`: how often, and by how much."""
+    """The lag of a unit, its `axes` on one board or several, and its `outs`.
+
+    `slips` and `slipped`: how often the computer was late, and by how much.
+    """
 
     def __init__(self) -> None:
         self.axes: list[Axis] = []
+        self.outs: list[Output] = []
         self.now: Ns = 0
         self.slips = 0
         self.slipped: Ns = 0
@@ -85,28 +109,65 @@ class Lag:
         """An output of the unit changes at cell time `at`: by how much later than the lead it does."""
         self.rested(at, at)
         self._changed = at if self._changed is None else max(at, self._changed)
-        return max(axis.lag for axis in self.axes)
+        return self._most
 
     def forget(self) -> None:
         """Nothing is under way that was later, as far as its axes are all at rest."""
         if self._still(self.axes):
             self.now = 0
 
-    def grow(self, found: Sequence[tuple[Late, Axis]]) -> None:
+    def grow(self, found: Sequence[tuple[Late, Axis]], wall: WallNs) -> None:
         """These axes are late."""
+        before, lags = self._most, [(axis, axis.lag) for axis in self.axes]
         slip = max((late.by for late, _ in found if late.slip), default=0)
         if slip:
             latest = next(axis for late, axis in found if late.by == slip and late.slip)
-            self.now += slip
-            self.slips += 1
-            self.slipped += slip
-            latest.delayed(min(axis.next_pulse() or NEVER for axis in self.axes), slip, slip=True, own=False)
+            self._slip(slip)
+            latest.delayed(self._next(), slip, slip=True, own=False)
         for late, axis in found:
             if late.by > slip:
                 alone = not self._still(other for other in self.axes if other is not axis)
                 if not alone:
                     self.now += late.by - slip
                 axis.delayed(axis.next_pulse() or NEVER, late.by - slip, slip=False, own=alone)
+        self._grew(lags)
+        for out in self.outs if self._most > before else ():
+            out.delayed(self._next(), self._most - before, wall)
+
+    def settle_outputs(self, wall: WallNs, heard: WallNs | None) -> None:
+        """An output is late: what follows comes later, too, where no motion is under way that could not any more."""
+        if self.waits:
+            return
+        late = [found for out in self.outs if (found := out.late(wall, heard)) is not None]
+        if not late:
+            return
+        at, by = min(at for at, _ in late), max(by for _, by in late)
+        if all((axis.told_through or 0) <= at and not axis.under_way for axis in self.axes):
+            lags = [(axis, axis.lag) for axis in self.axes]
+            self._slip(by)
+            self.axes[0].delayed(at, by, slip=True, own=False)
+            self._grew(lags)
+            for out in self.outs:
+                out.delayed(at, by, wall)
+
+    @property
+    def _most(self) -> Ns:
+        """Of all axes: outputs come with the latest."""
+        return max(axis.lag for axis in self.axes)
+
+    def _next(self) -> Ns:
+        return min(axis.next_pulse() or NEVER for axis in self.axes)
+
+    @staticmethod
+    def _grew(lags: Iterable[tuple[Axis, Ns]]) -> None:
+        for axis, before in lags:
+            if axis.lag > before:
+                axis.grew(before)
+
+    def _slip(self, by: Ns) -> None:
+        self.now += by
+        self.slips += 1
+        self.slipped += by
 
     @staticmethod
     def _still(axes: Iterable[Axis]) -> bool:
@@ -121,4 +182,4 @@ def settle(axes: Iterable[Axis], now: Ns, wall: WallNs) -> None:
         if late is not None:
             found.setdefault(axis.of, []).append((late, axis))
     for lag, ones in found.items():
-        lag.grow(ones)
+        lag.grow(ones, wall)

@@ -93,12 +93,16 @@ class Outgoing:
             ledger.stepper.adopt(ledger.shaft_at(self.cell.now))
             ledger.standing = Standing.DRIVEN
         for unit, pin in self.outs:
-            self._level(unit, pin, False, self.cell.now)  # until the recording tells better
+            self._level(unit, pin, False, self.cell.now, tell=False)  # until the recording tells better
         self.absorb()
+        for out in self.outs.values():
+            if out.levels.count == 1:  # it has nothing to tell
+                self.set(out, False, self.cell.now, fresh=True)
         self.past.keep()
 
     def commit(self) -> None:
         """Give the boards what is certain, at once."""
+        self.currents.follow(self.ledgers)  # steps that need it leave now, and nobody knows when this goes on
         self.committed = self.wall()
         self.boards.commit(self.cell.now, self.committed, self.wall)
         self.pending = False
@@ -208,14 +212,15 @@ class Outgoing:
         out = self.outs[unit, pin]
         out.levels.append((at, level))
         if tell:
-            self.set(out, level, at)
+            self.set(out, level, at, fresh=True)
 
-    def set(self, out: Out, level: bool, at: Ns) -> None:
-        """An output takes a level at cell time `at`."""
+    def set(self, out: Out, level: bool, at: Ns, *, fresh: bool = False) -> None:
+        """An output takes a level at cell time `at`; where that is late, and `fresh`, a late computer is to blame."""
         if self._withheld(out):
             return
         ledgers = self._of_unit.get(out.unit)
-        self.boards.outs[out.name].set(level, at, ledgers[0].stepper.of.changed(at) if ledgers else 0)
+        lag = ledgers[0].stepper.of.changed(at) if ledgers else 0
+        self.boards.outs[out.name].set(level, at, lag, fresh=fresh)
         self.pending = True
 
     def set_anew(self, out: Out, count: int, at: Ns) -> None:

@@ -5,15 +5,18 @@ from typing import NamedTuple
 
 from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.dictionary import Value
+from detent.realtime.boards.events import OutputLate
+from detent.realtime.boards.lag import Lag
 from detent.realtime.boards.setup import OutSetup
 from detent.realtime.pace import WallNs
-from detent.ticks import MS, Ns
+from detent.ticks import MS, SECOND, Ns
 
 HOLD: Ns = 8 * MS
 """A change is given to the board so long before it is due (or two margins): until then it can be taken back."""
 
 PAST = -(1 << 62)  # a tick before everything
 RETRY: WallNs = 1 * MS  # where a board has no room
+TOLD: Ns = 1 * MS  # what is later is told
 ONE_CHANGE = 16  # bytes of its message at most
 
 
@@ -21,6 +24,12 @@ class _Change(NamedTuple):
     at: Ns  # cell time
     tick: int
     level: bool
+    fresh: bool  # where it is late, a late computer is to blame
+
+
+class _Given(NamedTuple):
+    change: _Change  # with the tick that it was given for
+    before: bool  # the level there
 
 
 class DigitalOut:
@@ -36,12 +45,19 @@ class DigitalOut:
         self.corrections = 0
         self._core = core
         self._pending: deque[_Change] = deque()
+        self._given: deque[_Given] = deque(maxlen=64)  # of late; those that have yet to come are among them
         self._last_tick = PAST  # of what was given
         self._back: bool | None = None  # taken back: the level that it had there
         self._rewound = False
         self._fed_at: WallNs | None = None
         self._again_at: WallNs = 0  # not before: there was no room
         self.dead = True  # shut down, or not configured: nothing is sent
+        self.of: Lag | None = None
+
+    def shares(self, lag: Lag) -> None:
+        """It is late together with the axes of `lag`."""
+        self.of = lag
+        lag.outs.append(self)
 
     def config(self) -> tuple[str, dict[str, Value | str]]:
         """The command that makes it; pins by name."""
@@ -53,13 +69,13 @@ class DigitalOut:
             "max_duration": 0 if setup.watchdog is None else self._core.ticks(setup.watchdog),
         }  # fmt: skip
 
-    def set(self, level: bool, at: Ns, lag: Ns = 0) -> None:
+    def set(self, level: bool, at: Ns, lag: Ns = 0, *, fresh: bool = True) -> None:
         """From cell time `at` on the output has `level`; it changes at `at` + lead + `lag` (of the unit's axis).
 
         Times do not fall, but for a `rewind`. Several changes at one instant come a tick apart each. What is due
-        already is done at once.
+        already is done at once; if it is `fresh`, and not what a stop has changed, `OutputLate` says so.
         """
-        self._pending.append(_Change(at, self._core.scale.tick(at + lag), level))
+        self._pending.append(_Change(at, self._core.scale.tick(at + lag), level, fresh))
 
     def rewind(self, at: Ns, level: bool) -> None:
         """The cell is taken back to `at`, where it has the output at `level`; what is set next is the truth.
@@ -68,12 +84,43 @@ class DigitalOut:
         """
         while self._pending and self._pending[-1].at > at:
             self._pending.pop()
+        while self._given and self._given[-1].change.at > at:
+            self._given.pop()
         if not self._pending:  # else all that was given is for before `at`
             self._back, self._rewound = level, True
+
+    def delayed(self, at: Ns, by: Ns, wall: WallNs) -> None:
+        """What has yet to come, for cell time `at` or behind it, comes later by so much more.
+
+        What was given to the board and cannot be called back is corrected, as it comes, until its time.
+        """
+        ticks, present = self._core.ticks(by), self._core.clock.tick_at(wall)
+        self._pending = deque(
+            change._replace(tick=change.tick + ticks) if change.at >= at else change for change in self._pending
+        )
+        while self._given and self._given[-1].change.at >= at and self._given[-1].change.tick > present:
+            change, before = self._given.pop()
+            self._pending.appendleft(change._replace(tick=change.tick + ticks))
+            self._back, self._rewound = before, True
+
+    def late(self, wall: WallNs, heard: WallNs | None) -> tuple[Ns, Ns] | None:
+        """The cell time of its next change, and by how much it is late, if a late computer is to blame.
+
+        None, too, where a stop that was not heard of yet (up to `heard`) may take it back.
+        """
+        core = self._core
+        if self.dead or self._back is not None or not self._pending or not self._pending[0].fresh:
+            return None
+        change, present = self._pending[0], core.clock.tick_at(wall)
+        if change.tick >= core.soonest(wall) or (heard is not None and core.clock.tick_at(heard) < change.tick):
+            return None
+        late = present + core.ticks(core.setup.lead // 2) - change.tick  # what follows is not in haste, too
+        return change.at, -(-late * SECOND // core.frequency)
 
     def now(self, level: bool) -> None:
         """Take `level` as soon as may be, behind what was given to the board before; what was not is forgotten."""
         self._pending.clear()
+        self._given.clear()
         self._back, self._rewound = level, False
 
     # -- what leaves
@@ -97,17 +144,31 @@ class DigitalOut:
         horizon = soonest + core.ticks(max(HOLD - core.setup.margin, core.setup.margin))
         known = None if heard is None else core.clock.tick_at(heard)
         waits = False
-        while self._pending and (self._pending[0].tick <= horizon or self._pending[0].at <= firm):
+        while (
+            self._pending
+            and not (self.of is not None and self.of.waits)
+            and (self._pending[0].tick <= horizon or self._pending[0].at <= firm)
+        ):
             if known is not None and known < self._pending[0].tick < soonest:
                 waits = True
                 break
-            change = self._pending.popleft()
+            change, before = self._pending.popleft(), self.level
             if not self._give(change.tick, change.level, soonest, wall):
                 self._pending.appendleft(change)
                 return False
+            came = max(self._last_tick, core.clock.tick_at(wall))
+            self._given.append(_Given(change._replace(tick=came), before))
+            self._tell(change, came)
         if self._hungry(wall):
             self._feed(wall)
         return waits
+
+    def _tell(self, change: _Change, came: int) -> None:
+        """It was given for tick `came`: say so, if it was late."""
+        core = self._core
+        by = came - change.tick
+        if change.fresh and by > core.ticks(TOLD):
+            core.events.append(OutputLate(core.setup.name, self.name, change.at, by * SECOND // core.frequency))
 
     def wants(self, wall: WallNs) -> bool:
         """Whether there is anything to give to the board, soon or now."""
@@ -191,6 +252,7 @@ class DigitalOut:
         """The board is configured, or ready again, with the output at `level` (None: as it is set up)."""
         self.level = self.setup.initial if level is None else level
         self._pending.clear()
+        self._given.clear()
         self._back = None
         self._last_tick = PAST
         self._fed_at = wall - (self.setup.watchdog or 0)

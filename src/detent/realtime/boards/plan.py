@@ -95,7 +95,7 @@ def plan(described: Description, controllers: Mapping[str, Controller], least_le
             found = next(p for p in controller.pins if p.name == pin)
             rest = found.rest == HIGH or found.kind is PinKind.OPEN_COLLECTOR
             outs[unit, pin] = name = f"{unit}.{pin}"
-            here.outs.append(OutSetup(name, Pin.parse(text), rest, rest, described.boards[table.board].watchdog))
+            here.outs.append(OutSetup(name, Pin.parse(text), rest, rest, described.boards[table.board].watchdog, unit))
             keys[name] = f"{where}.outputs.{pin}"
         for pin, text in table.inputs.items():
             name = f"{unit}.{pin}"
@@ -163,7 +163,7 @@ def _axis(
     keys[key] = where
     if table.enable is not None:
         axis = axis._replace(enable=f"{key}.enable")
-        here.outs.append(OutSetup(axis.enable, Pin.parse(table.enable), watchdog=board.watchdog))
+        here.outs.append(OutSetup(axis.enable, Pin.parse(table.enable), watchdog=board.watchdog, unit=axis.unit))
         keys[axis.enable] = f"{where}.enable"
     driver = table.driver
     if driver is not None and driver.kind == "plain":

@@ -186,7 +186,7 @@ class Rollback:
         self._outgoing.arm()
         self._outgoing.commit()
         for out in self._outgoing.outs.values():
-            self._tell_out(out, levels[out.name], places[out.name], at, stopped)
+            self._tell_out(out, levels[out.name], places[out.name], at)
         self._outgoing.pending = True
 
     def _told(self, batches: Sequence[Batch], ledger: AxisLedger, *kinds: type[AxisNews]) -> int:
@@ -246,12 +246,11 @@ class Rollback:
         for motion in (*([force] if force is not None else []), *new):
             ledger.stepper.tell(motion)
 
-    def _tell_out(self, out: Out, old: list[tuple[Ns, bool]], count: int, at: Ns, stopped: AxisLedger) -> None:
+    def _tell_out(self, out: Out, old: list[tuple[Ns, bool]], count: int, at: Ns) -> None:
         """Tell the boards what an output does behind its first `count` levels, where it did `old` before."""
         new = out.levels.since(count)
-        mine = out.unit == self._cell.unit(stopped.what.unit)
         same = alike(old, new)
-        if not mine and same == len(old):
+        if same == len(old):
             for when, level in new[same:]:
                 self._outgoing.set(out, level, when)
         else:

@@ -78,7 +78,7 @@ class OutSetup:
     """A digital output. Levels are logical: an active low pin is low where it is told True.
 
     `initial` is how it comes up, `off` what it falls to at a shutdown, and, with a `watchdog`, when nobody has
-    refreshed it for so long (the firmware then shuts down).
+    refreshed it for so long (the firmware then shuts down). It is late together with the axes of its `unit`.
     """
 
     name: str
@@ -86,6 +86,7 @@ class OutSetup:
     initial: bool = False
     off: bool = False
     watchdog: Ns | None = None
+    unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from detent.pulses import Train
 from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.count import Count
 from detent.realtime.boards.dictionary import Message, Value
-from detent.realtime.boards.events import CountDiffers, CountEnds, Later, Slipped
+from detent.realtime.boards.events import CountDiffers, CountEnds, Slipped
 from detent.realtime.boards.lag import Lag, Late
 from detent.realtime.boards.setup import StepperSetup
 from detent.realtime.boards.undo import Undo
@@ -78,6 +78,7 @@ class Stepper:
         self._own: Ns = 0  # lag beyond that of its unit
         self._trail: tuple[Ns, Ns] = 0, 0  # the last pulse that came with an earlier lag, and that lag
         self._sooner: tuple[Ns, Ns] = 0, 0  # the last pulse that was sent before the lag grew last, and that lag
+        self._grown = NOWHERE  # the tick of the first pulse that comes later since
         self._through: tuple[Train, int] | None = None  # the last pulse sent
         self._core = core
         sign = -1 if setup.dir.active_low and setup.minus is None else 1
@@ -169,10 +170,11 @@ class Stepper:
 
     def lag_at(self, tick: int) -> int:
         """The lag, in ticks, of a pulse that was on its way at `tick`."""
-        core = self._core
-        through, lag = self._trail
-        earlier = core.ticks(lag)
-        return earlier if earlier and tick <= core.scale.tick(through) + earlier else core.ticks(self.lag)
+        core, (through, earlier), (_, sooner) = self._core, self._trail, self._sooner
+        if earlier and tick <= core.scale.tick(through) + core.ticks(earlier):
+            return core.ticks(earlier)
+        # up to the first pulse that came later nothing else can have moved
+        return core.ticks(sooner if sooner < self.lag and tick < self._grown else self.lag)
 
     @property
     def told_through(self) -> Ns | None:
@@ -181,13 +183,20 @@ class Stepper:
 
     def delayed(self, at: Ns, by: Ns, *, slip: bool, own: bool) -> None:
         """From cell time `at` on it comes later by so much more; `own`: it alone, and not its unit."""
-        if self.told_through is not None:
-            through = min(self.told_through, (self.next_pulse() or NEVER) - 1)  # what was not made comes later, too
-            if through != self._sooner[0]:
-                self._sooner = through, self.lag - (0 if own else by)
         if own:
             self._own += by
-        self._core.events.append((Slipped if slip else Later)(self.board, self.name, at, by))
+        if slip:
+            self._core.events.append(Slipped(self.board, self.name, at, by))
+
+    def grew(self, before: Ns) -> None:
+        """Its lag was `before` for what it was sent."""
+        due = self.next_pulse()
+        if self.told_through is not None:
+            through = self.told_through if due is None else min(self.told_through, due - 1)  # and not what was not made
+            if through != self._sooner[0]:
+                self._sooner = through, before
+        if due is not None:
+            self._grown = self.tick(due)
 
     def caught_up(self, now: Ns) -> None:
         """Its next pulse comes a lead behind the cell again, whatever the last one did, which may be under way."""
@@ -219,6 +228,11 @@ class Stepper:
     def resting(self) -> bool:
         """Whether no pulse is to come that was told of. The last one sent may still be a lead away."""
         return not self._spans
+
+    @property
+    def under_way(self) -> bool:
+        """Whether a motion goes on of which pulses were sent."""
+        return bool(self._spans) and not (self._spans[0].anew and self._spans[0].next == 1)
 
     def tell(self, entry: MotionStarted | MotionCut | MotionEnded) -> None:
         """What the axis did, in the order in which it was drained. Nothing is sent before `Boards.commit`.
@@ -296,7 +310,7 @@ class Stepper:
         self._told = self._sent = shaft
         self._halted = self._stopped = False
         self._regaining, self.dried = not slipped, False
-        self._sooner = 0, 0  # some of what was sent then may not have been made
+        self._sooner, self._grown = (0, 0), NOWHERE  # some of what was sent then may not have been made
         self._proved, self._doubted = False, None
 
     def next_pulse(self) -> Ns | None:
