@@ -17,10 +17,12 @@ from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwi
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.frames import Reader, read_integer
 from detent.realtime.boards.link import Link
-from detent.realtime.boards.opening import boards_of, make_ready
+from detent.realtime.boards.opening import boards_of, make_ready, set_drivers
 from detent.realtime.boards.plan import Plan, plan
+from detent.realtime.boards.registers import CHOPCONF, settings
 from detent.realtime.boards.replies import HeldStores
 from detent.realtime.boards.setup import Pin
+from detent.realtime.boards.stages import stages
 from detent.realtime.boards.states import News
 from detent.realtime.loop import Loop
 from detent.realtime.pace import Pace
@@ -149,7 +151,7 @@ class Bench:
         self._away = away
         self._jitter, self._until = jitter, self.wall
         described = parse(text, "cell.toml")
-        trial = build(described, read, record=False)
+        trial = build(described, read)
         self.plan = plan(described, trial.controllers())
         self.machines: dict[str, Machine] = {}
         self.ports: dict[str, Wire] = {}
@@ -167,6 +169,8 @@ class Bench:
 
         self.boards = boards_of(self.plan, open_port)
         levels = make_ready(self.boards, self.plan, lambda: self.wall, self._sleep)
+        if chips:
+            set_drivers(self.boards, self.plan, stages(self.plan, trial), lambda: self.wall, self._sleep)
         self.stores = HeldStores(store)
         given = {self.plan.inputs[name]: level for name, level in levels.items()}
         self.cell: Cell = build(described, read, store=self.stores.save, line_timing=line_timing, inputs=given)
@@ -298,9 +302,35 @@ class Bench:
         for out in self.driven.outgoing.outs.values():
             board = next(name for name, board in self.boards.boards.items() if out.name in board.outs)
             setup, edges = self.boards.outs[out.name].setup, self.machines[board].edges
-            found = [level is not setup.pin.active_low for _, pin, level in edges if pin == setup.pin.name]
+            found: list[tuple[int, bool]] = []
+            for tick, pin, level in edges:
+                if pin == setup.pin.name and found and tick <= found[-1][0] + 1:
+                    found.pop()  # it had been given to the board for too soon a time, and was set right as it came
+                elif pin == setup.pin.name:
+                    found.append((tick, level is not setup.pin.active_low))
             wanted = [setup.initial, *(level for _, level in out.levels.since(1))]
-            assert found == [level for level, _ in groupby(wanted)], out.name
+            assert [level for _, level in found] == [level for level, _ in groupby(wanted)], out.name
+
+    def check_microsteps(self) -> None:
+        """Every step was made with the microsteps that its controller had commanded before it.
+
+        Where no stop took anything back, and the computer was never away. The bench has kept all (`keep`).
+        """
+        for ledger in self.driven.ledgers:
+            found = [
+                setup for board, _ in self.plan.setups for setup in board.drivers if setup.name == ledger.what.driver
+            ]
+            if not found or not ledger.stages.count:
+                continue
+            [setup] = found
+            assert setup.uart is not None
+            chip = self.ports[ledger.what.board].board.chips[setup.uart.name][0]
+            written = [(tick, value >> 24 & 15) for tick, register, value in chip.log if register == CHOPCONF]
+            told = pulses(ledger.motions.since(0), self.cell.now)
+            for (at, place), (tick, _) in zip(told, self.edges(ledger.name), strict=True):
+                stage = [staged.stage for staged in ledger.stages.since(0) if staged.behind < at][-1]
+                wanted = next(entry.value for entry in settings(setup, stage) if entry.register == CHOPCONF)
+                assert [value for since, value in written if since <= tick][-1] == wanted >> 24 & 15, place
 
     def keep(self) -> None:
         """Nothing is forgotten of what the cell did."""

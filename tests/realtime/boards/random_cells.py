@@ -14,7 +14,7 @@ LINES = {
     "gs-c200s": "S{s} T{t} R{k} +{n} -{n} g+ g- H+ H- A1 C1 A2 C2 g+1 Z K G{n}",
     "bs0610": "X{n}G X-{n}G Y{n}G Y-{n}G X+S X-S B+S B{n}G BZ XZ X{n}GYZ R{t} K{k} !",
     "supersigma": "originate move+{n} move-{n} stop emergency",
-    "dcb-274": "+{n} -{n} M{r} M-{r} M0 F{r},0 F{r},1 @ \x1b Z0 R{n} R-{n} |",
+    "dcb-274": "+{n} -{n} M{r} M-{r} M0 F{r},0 F{r},1 @ \x1b Z0 R{n} R-{n} | H{h} H{h} Y{s},{k}",
 }
 """What a host may say to each kind."""
 
@@ -82,7 +82,7 @@ class RandomCell:
         unit, model = random.choice(self.units)
         line = random.choice(LINES[model].split(" ")).format(
             n=random.randrange(1, 800), r=random.randrange(200, 4000), s=random.choice([5, 20, 50]),
-            t=random.randrange(50, 300), k=random.randrange(1, 60),
+            t=random.randrange(50, 300), k=random.randrange(1, 60), h=random.randrange(4),
         )  # fmt: skip
         if model == "bs0610" or len(line) == 1:
             bench.send(unit, line.encode())
@@ -118,13 +118,18 @@ class RandomCell:
     def _unit(self, unit: str, model: str, board: str, more: str = "") -> None:
         self.text += f'[units.{unit}]\nmodel = "{model}"\n{more}[hardware.{unit}]\nboard = "{board}"\n'
 
-    def _motor(self, name: str, board: str) -> None:
+    def _motor(self, name: str, board: str, model: str) -> None:
         self.steppers.append(name)
         self.text += f'step = "{self._any(board)}"\ndir = "{self._any(board)}"\n'
         if self._random.random() < 0.6:
             self.text += f'enable = "{self._any(board)}"\n'
-        if self._random.random() < 0.3:
+        kind = self._random.random()
+        if kind < 0.3:
             self.text += f'driver = {{ kind = "plain", half = "{self._any(board)}" }}\n'
+        elif kind < 0.5 and model != "bs0610":
+            more = "sense = 0.05, amperes = 1.5" if model == "dcb-274" else "amperes = 0.8"
+            more += ", microsteps = 2" if model in ("gs-c200s", "supersigma") else ""
+            self.text += f'driver = {{ kind = "tmc2209", uart = "{self._pin(board)}", {more} }}\n'
 
     def _outputs(self, board: str, *names: str) -> None:
         chosen = [f'{name} = "{self._any(board)}"' for name in names if self._random.random() < 0.6]
@@ -153,7 +158,7 @@ class RandomCell:
     def _gsc200(self, unit: str) -> None:
         random, board = self._random, self._random.choice(self.boards)
         self._unit(unit, "gs-c200s", board, 'straps = { CHS = "low" }\n')
-        self._motor(unit, board)
+        self._motor(unit, board, "gs-c200s")
         self._outputs(board, "MOV", "RDY", "RAMP", "UO1")
         end = random.randrange(30, 400)
         places = {"EOT": (end, FAR), "HOME": (-FAR, random.randrange(-20, end))}
@@ -162,7 +167,7 @@ class RandomCell:
     def _dcb274(self, unit: str) -> None:
         board, end = self._random.choice(self.boards), self._random.randrange(30, 300)
         self._unit(unit, "dcb-274", board, f'options = {{ name = "{unit.upper()}" }}\n')
-        self._motor(unit, board)
+        self._motor(unit, board, "dcb-274")
         self._outputs(board, "P5")
         names = ("LIMIT-A", "LIMIT-B", "HOME", "JOG1", "JOG2")
         places = {"LIMIT-A": (end, FAR), "LIMIT-B": (-FAR, -end), "HOME": (-20, -10)}
@@ -171,7 +176,7 @@ class RandomCell:
     def _supersigma(self, unit: str) -> None:
         board, end = self._random.choice(self.boards), self._random.randrange(30, 400)
         self._unit(unit, "supersigma", board)
-        self._motor(unit, board)
+        self._motor(unit, board, "supersigma")
         self._outputs(board, "P23")
         self._inputs(unit, board, "FORCE", "RAIL", axis=unit, places={"RAIL": (-FAR, -end // 8 - 2)})
 
@@ -183,7 +188,7 @@ class RandomCell:
         for axis in "XY":
             board = self._random.choice(self.boards)
             self.text += f'[hardware.{unit}.{axis}]\nboard = "{board}"\n'
-            self._motor(f"{unit}.{axis}", board)
+            self._motor(f"{unit}.{axis}", board, "bs0610")
             low, high = f"L{axis}-", f"L{axis}+"
             places = {low: (-FAR, -end // 2), high: (end, FAR)}
             self._inputs(unit, board, low, high, axis=f"{unit}.{axis}", places=places)

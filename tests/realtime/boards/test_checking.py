@@ -299,3 +299,26 @@ def test_microsteps_are_said_once() -> None:
     text = TMC.replace("gs-c200", "dcb-274").replace("EOT = ", "LIMIT-A = ").replace("UI1 = ", "LIMIT-B = ")
     with pytest.raises(Problem, match=r"hardware\.x\.driver\.microsteps: a dcb-274 commands that itself: leave it out"):
         Bench(text)
+
+
+def test_a_chip_that_cannot_do_what_a_controller_commands_in_a_move_is_refused_before_anything_moves() -> None:
+    """A BS0610 changes to full steps at speed (A)."""
+    text = """
+[units.x]
+model = "bs0610"
+[boards.b]
+serial = "fake"
+[hardware.x.X]
+board = "b"
+step = "gpio2"
+dir = "gpio3"
+unwired = ["LX-", "LX+"]
+driver = { kind = "tmc2209", uart = "gpio20", amperes = 0.8 }
+[hardware.x.Y]
+board = "b"
+step = "gpio5"
+dir = "gpio6"
+unwired = ["LY-", "LY+"]
+"""
+    with pytest.raises(Problem, match=r"hardware\.x\.X\.driver\.kind: the controller changes its sequence of"):
+        Bench(text)

@@ -22,7 +22,7 @@ class Session:
     def __init__(self, seed: int, *, rough: bool) -> None:
         self.random = random = Random(seed)
         self.cell, self.rough = RandomCell(random), rough
-        self.befallen, self.restarted = False, set[str]()
+        self.befallen, self.stalled, self.restarted = False, False, set[str]()
         self.away, self.late = random.choice([0.0, 0.0, 0.001, 0.003]), False
         jitter = random.choice([50, 400, 400, 1000 if self.cell.lead == 5 else 3000]) * US
 
@@ -31,7 +31,7 @@ class Session:
 
         self.bench = Bench(
             self.cell.text, switches=self.cell.switches, jitter=lambda: random.randrange(jitter), away=away,
-            spare_exposed=True,
+            spare_exposed=True, chips=True,
             port={"drift": random.choice([0.0, 60.0, -90.0]), "delay": random.choice([30, 100, 800]) * US},
         )  # fmt: skip
         self.kept = random.random() < 0.3
@@ -100,6 +100,7 @@ class Session:
             bench.run(random.choice([span, random.randrange(span)]) + 1)
             if random.random() < 0.12:
                 bench.stall(random.randrange(5 * MS, 120 * MS))
+                self.stalled = True
             if random.random() < 0.04:
                 self.switch_off_and_on()
             if self.rough and random.random() < 0.15:
@@ -116,6 +117,8 @@ class Session:
         bench.check_drivers(late=self.away > 0)
         if self.kept and not self.befallen and not bench.driven.rollback.rewinds:
             bench.check_levels()
+            if not self.away and not self.stalled:
+                bench.check_microsteps()
         assert bench.driven.rollback.escaped == 0 or cell.replies == "at once"
         if not self.befallen:
             assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news

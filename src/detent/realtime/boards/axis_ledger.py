@@ -175,10 +175,12 @@ class AxisLedger:
             if pulse != last:
                 end = motion.train.time_of(pulse + 1) - 1
             elif isinstance(after, MotionStarted):
-                end = after.at
+                end = _before_first(after)
             else:
                 following = told[place + 2] if place + 2 < len(told) else None
                 end = NEVER if following is None else following.at
+                if isinstance(following, MotionStarted):
+                    end = _before_first(following)
             if begin > end:
                 continue
             nearest = min(max(near, begin), end)
@@ -225,6 +227,14 @@ def _pulses(force: MotionStarted | None, told: list[Motion], after: Ns, until: N
         current = motion if isinstance(motion, MotionStarted) else None
         low = 0 if current is None else current.first - 1
     return found
+
+
+def _before_first(motion: MotionStarted) -> Ns:
+    """The last time at which a motion has begun, or is about to, and has given none of its pulses."""
+    steps = motion.train.steps
+    if steps is not None and steps < motion.first:
+        return motion.at
+    return min(motion.at, motion.train.time_of(motion.first) - 1)
 
 
 def _given(motion: MotionStarted, now: Ns) -> int:

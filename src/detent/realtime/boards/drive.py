@@ -19,7 +19,7 @@ from detent.realtime.boards.plan import Plan, plan
 from detent.realtime.boards.port import Port
 from detent.realtime.boards.ports import open_port
 from detent.realtime.boards.replies import HeldStores
-from detent.realtime.boards.stages import stages
+from detent.realtime.boards.stages import can, stages
 from detent.realtime.boards.states import News
 from detent.realtime.boards.stepper import LONGEST
 from detent.realtime.boards.warming import first_moves
@@ -58,12 +58,12 @@ class Opened:
         self.plan: Plan = plan(described, trial.controllers(), least_lead)
         self.stages = stages(self.plan, trial)
         """What the power stage of each stepper is told at first."""
+        can(self.plan, first_moves(described))
         self.boards: Boards = boards_of(self.plan, real.open_port)
         try:
             self._levels: dict[str, Level] = make_ready(self.boards, self.plan, real.wall, real.sleep)
             set_drivers(self.boards, self.plan, self.stages, real.wall, real.sleep)
             _warm_up(self.plan.setups[0][0].error)
-            first_moves(described)
         except BaseException:
             self.boards.close()
             raise

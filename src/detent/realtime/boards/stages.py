@@ -1,11 +1,16 @@
-"""What the power stage behind each driven axis is told when the cell starts: by its controller, or by the cell file."""
+"""What the power stage behind each driven axis is told when the cell starts: by its controller, or by the cell file.
 
-from collections.abc import Mapping
+And whether the driver can do what a controller commands.
+"""
+
+from collections.abc import Mapping, Sequence
 
 from detent.cell.cell import Cell
 from detent.cell.description import Problem
 from detent.controllers.device import DriveSet, Stage, StageSet
 from detent.realtime.boards.plan import Plan
+from detent.realtime.boards.registers import settings
+from detent.realtime.boards.setup import SetupProblem
 
 
 def stages(plan: Plan, cell: Cell) -> Mapping[str, Stage]:
@@ -27,6 +32,17 @@ def stages(plan: Plan, cell: Cell) -> Mapping[str, Stage]:
         if stage is not None:
             found[axis.stepper] = stage
     return found
+
+
+def can(plan: Plan, moves: Mapping[tuple[str, str], Sequence[Stage]]) -> None:
+    """The driver chips can do what controllers command in their first `moves`, by unit and axis. Problem."""
+    drivers = {driver.name: driver for setup, _ in plan.setups for driver in setup.drivers}
+    for axis in plan.axes:
+        for stage in moves.get((axis.unit, axis.axis), ()) if axis.driver else ():
+            try:
+                settings(drivers[axis.driver], stage)
+            except SetupProblem as problem:
+                raise plan.problem(problem) from None
 
 
 def _commanded(cell: Cell, unit: str, axis: str) -> Stage | None:

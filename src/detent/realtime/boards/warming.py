@@ -4,10 +4,11 @@ The first ramp of a SUPERSIGMA takes the tenth part of a second, with its tables
 the cell would wait for it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from detent.cell.build import build
 from detent.cell.description import Description, single
+from detent.controllers.device import DriveSet, Stage, StageSet
 from detent.ticks import SECOND
 
 FIRST_MOVES: Mapping[str, tuple[str, ...]] = {
@@ -21,16 +22,26 @@ FIRST_MOVES: Mapping[str, tuple[str, ...]] = {
 """Commands that move each model: with ramps and the whole way up, and a short way."""
 
 
-def first_moves(described: Description) -> None:
-    """Let a controller like each of the cell make its first moves, in a cell of its own and in no time."""
-    for unit in described.units.values():
+def first_moves(described: Description) -> Mapping[tuple[str, str], Sequence[Stage]]:
+    """Let a controller like each of the cell make its first moves, in a cell of its own and in no time.
+
+    By unit and axis what they command of the power stages.
+    """
+    found: dict[tuple[str, str], list[Stage]] = {}
+    for name, unit in described.units.items():
         lines = FIRST_MOVES.get(unit.model, ())
         if lines:
-            cell = build(single(unit.model, options=unit.options), _no_file, record=False)
+            cell = build(single(unit.model, options=unit.options), _no_file)
             cell.run_to(SECOND)
             for line in lines:
                 cell.type(unit.model, line)
                 cell.run_to(cell.now + 10 * SECOND)
+            assert cell.recording is not None
+            for entry in cell.recording.of(unit.model, StageSet, DriveSet):
+                if isinstance(entry, (StageSet, DriveSet)):
+                    stage = entry.stage if isinstance(entry, StageSet) else entry.drive.stage
+                    found.setdefault((name, entry.axis), []).append(stage)
+    return found
 
 
 def _no_file(name: str) -> str:
