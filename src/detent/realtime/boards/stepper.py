@@ -170,11 +170,12 @@ class Stepper:
 
     def lag_at(self, tick: int) -> int:
         """The lag, in ticks, of a pulse that was on its way at `tick`."""
-        core, (through, earlier), (_, sooner) = self._core, self._trail, self._sooner
+        core, (through, earlier), (sent, sooner) = self._core, self._trail, self._sooner
         if earlier and tick <= core.scale.tick(through) + core.ticks(earlier):
             return core.ticks(earlier)
-        # up to the first pulse that came later nothing else can have moved
-        return core.ticks(sooner if sooner < self.lag and tick < self._grown else self.lag)
+        if sooner < self.lag and tick < max(self._grown, core.scale.tick(sent) + core.ticks(sooner) + 1):
+            return core.ticks(sooner)
+        return core.ticks(self.lag)
 
     @property
     def told_through(self) -> Ns | None:
@@ -195,8 +196,8 @@ class Stepper:
             through = self.told_through if due is None else min(self.told_through, due - 1)  # and not what was not made
             if through != self._sooner[0]:
                 self._sooner = through, before
-        if due is not None:
-            self._grown = self.tick(due)
+        # until then a motion under way is where its last pulse left it; one that has yet to begin is later, all of it
+        self._grown = self.tick(due) if due is not None and self.under_way else NOWHERE
 
     def caught_up(self, now: Ns) -> None:
         """Its next pulse comes a lead behind the cell again, whatever the last one did, which may be under way."""
