@@ -1,7 +1,10 @@
 """Whole machines behind one fake board: the drilling cell, three axes on a party line, two motors with their limits."""
 
+from itertools import pairwise
 from pathlib import Path
+from random import Random
 
+import pytest
 from tests.realtime.boards.driven_bench import Bench, pulses
 
 from detent.cell.build import build
@@ -371,6 +374,30 @@ def test_the_master_of_time_may_come_back() -> None:
         bench.run(1 * SECOND)
         bench.rest()
         assert (bench.position("x"), bench.position("y")) == (30, 30)
+        assert not [news for news in bench.news if "slipped" in news.text]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_axis_goes_on_evenly_while_the_master_of_time_comes_back(seed: int) -> None:
+    """What is known of the new clock differs from the old: no pulse of another board comes out of its turn."""
+    random = Random(seed)
+    with Bench(BOARDS, jitter=lambda: random.randrange(3 * MS), port={"drift": random.choice([-90.0, 60.0])}) as bench:
+        bench.run(100 * MS)
+        bench.type("y", "S5")
+        bench.run(50 * MS)
+        bench.type("y", "g+")
+        bench.run(1 * SECOND)
+        left = bench.ports["left"]
+        left.unplugged = True
+        bench.run(1 * SECOND + random.randrange(2 * SECOND))
+        left.board.clear()
+        left.unplugged = False
+        bench.driven.recover()
+        bench.run(3 * SECOND)
+        assert [state.standing for state in bench.driven.axes()] == [Standing.DRIVEN] * 2
+        ticks = [tick for tick, place in bench.edges("y") if place > 150]
+        spans = [after - before for before, after in pairwise(ticks)]
+        assert max(spans) < min(spans) * 1.01 + 2 * 25 * 16  # its error of a tick or 25 us
         assert not [news for news in bench.news if "slipped" in news.text]
 
 

@@ -98,14 +98,17 @@ class Boards:
         return clock.wall_at_ns(board_ns - self._bias)
 
     def align(self, cell: Ns, board_ns: Ns) -> None:
-        """Cell time `cell` is the master's time `board_ns`: with which everything begins. Pins are a lead later."""
+        """Cell time `cell` is the master's time `board_ns`: everything begins, or goes on. Pins are a lead later.
+
+        On another board that moves nothing jumps: its line is met again within a while.
+        """
         self._aligned = cell, board_ns
         self._redrawn = cell
         frequency = self.master.frequency
         tick = (board_ns - self._bias + self.lead) * frequency // SECOND
         self.master.core.scale = Scale(frequency, SECOND, tick, cell)
         for board, _ in self._pairs[1:]:
-            self._draw(board, cell, None)
+            self._redraw(board, cell, self._committed)
         for stepper in self.steppers.values():
             stepper.rescale()
 
@@ -150,6 +153,11 @@ class Boards:
         numerator = slope * SECOND // MEETING
         board.core.scale = Scale(numerator, SECOND << FINER, begin, now)
 
+    def _redraw(self, board: Board, now: Ns, wall: WallNs) -> None:
+        """The same, from where it is: pulses that have left have theirs, and no later one may come before them."""
+        still = all(stepper.over(wall) for stepper in board.steppers.values())
+        self._draw(board, now, None if still else board.core.scale.tick(now))
+
     # -- work
 
     def start(self, wall: WallNs) -> None:
@@ -174,8 +182,7 @@ class Boards:
             for board, _ in self._pairs[1:]:
                 if board.state is not State.READY:
                     continue
-                still = all(stepper.over(wall) for stepper in board.steppers.values())
-                self._draw(board, now, None if still else board.core.scale.tick(now))
+                self._redraw(board, now, wall)
                 for stepper in board.steppers.values():
                     stepper.rescale()
         if len(self._pairs) > 1:  # a unit on several boards is late on all of them
