@@ -33,14 +33,14 @@ PLAIN = re.compile(r"[^|&;<>$`*?~]+")  # a command that needs no shell
 FILE = re.compile(r"<!-- file: (?P<name>\S+) -->\n+```\w*\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 BIN = Path(sys.executable).parent
 
-# Generated cases are the same in every run: a test passes every time, or fails every time. `make test` tries a quarter.
+# Generated cases are the same in every run: a test passes every time, or fails every time. `make test` tries a sixth.
 hypothesis_settings.register_profile("all", derandomize=True, deadline=None, max_examples=100)
-hypothesis_settings.register_profile("quarter", derandomize=True, deadline=None, max_examples=25)
+hypothesis_settings.register_profile("sixth", derandomize=True, deadline=None, max_examples=17)
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """How many cases are generated; a test whose settings have a number of their own asks `tests.generated`."""
-    hypothesis_settings.load_profile("quarter" if config.getoption("markexpr") == "not slow" else "all")
+    hypothesis_settings.load_profile("sixth" if config.getoption("markexpr") == "not slow" else "all")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -1,4 +1,4 @@
-"""How many cases a test generates: all by `make test-all`, a quarter by `make test` (the profiles in `conftest.py`)."""
+"""How many cases a test generates: all by `make test-all`, a sixth by `make test` (the profiles in `conftest.py`)."""
 
 from hypothesis import settings
 

@@ -360,7 +360,7 @@ def check(count: int) -> int:
 
 
 def test_nobody_can_tell() -> None:
-    assert check(len(seeds(32))) > 2
+    assert check(len(seeds(48))) > 2
 
 
 @pytest.mark.slow

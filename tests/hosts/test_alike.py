@@ -28,6 +28,7 @@ DRIVERS: dict[str, Callable[[Any], Any]] = {
     "dcb-274": lambda port: BlockingDcb274(Dcb274(), port),
     "bs0610": lambda port: BlockingGenStepper(GenStepper("X"), port),
 }
+MORE_BABBLE = ["prompts", "letters", "nulls"]
 PATIENT = {"gs-c200": 7, "gs-c200s": 7, "supersigma": 3, "dcb-274": 12, "bs0610": 4}
 """Seconds in which a call on a line that babbles is over: its tries, and what it does to clear the line."""
 
@@ -202,7 +203,9 @@ def calls(unit: Blocking) -> Iterator[tuple[str, Callable[[], object]]]:
         yield name, lambda method=method, needed=needed: method(*needed)
 
 
-@pytest.mark.parametrize("kind", ["random", "frames", "prompts", "letters", "nulls", "lines"])
+@pytest.mark.parametrize(
+    "kind", ["random", "frames", "lines"] + [pytest.param(kind, marks=pytest.mark.slow) for kind in MORE_BABBLE]
+)
 @pytest.mark.parametrize("model", DRIVERS)
 def test_every_call_on_a_line_that_babbles_ends_in_time_with_a_short_error(model: str, kind: str) -> None:
     for name, call in list(calls(DRIVERS[model](Babbling(noise(kind))))):

@@ -61,8 +61,8 @@ def test_outputs_change_with_the_pulses_they_belong_to() -> None:
         assert [level for _, level in levels(bench, "gpio7")][-2:] == [True, False]
 
 
-@pytest.mark.parametrize("pause", [1, 60, 100, 118, 122, 150, 400])
-@pytest.mark.parametrize("ahead", [1, 60, 119, 125])
+@pytest.mark.parametrize("pause", [1, 118, 122, 400])
+@pytest.mark.parametrize("ahead", [1, 119])
 def test_behind_a_slip_outputs_and_steps_keep_their_order_and_distance(pause: int, ahead: int) -> None:
     """A brake that is let go before a motion is let go before it on the pins, too, and by as much."""
     with Bench(CELL) as bench:

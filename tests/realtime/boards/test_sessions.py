@@ -155,7 +155,7 @@ def session(kind: str, seed: int) -> int:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_whatever_is_said_and_pressed_nothing_is_lost(kind: str) -> None:
-    assert sum(session(kind, seed) for seed in seeds(16)) > 0
+    assert sum(session(kind, seed) for seed in seeds(24)) > 0
 
 
 @pytest.mark.slow
@@ -346,7 +346,7 @@ def same_time(bench: Bench) -> None:
 
 
 def test_the_axes_of_a_unit_are_late_together() -> None:
-    slips, stops = (sum(counts) for counts in zip(*(late_together(seed) for seed in seeds(16)), strict=True))
+    slips, stops = (sum(counts) for counts in zip(*(late_together(seed) for seed in seeds(24)), strict=True))
     assert slips > 2
     assert stops > 4
 

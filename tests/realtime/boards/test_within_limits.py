@@ -126,7 +126,7 @@ def asked_while_late(seed: int) -> int:
 
 
 def test_what_is_said_while_the_computer_is_late_waits_for_what_happened_meanwhile() -> None:
-    assert sum(asked_while_late(seed) for seed in seeds(16)) > 3
+    assert sum(asked_while_late(seed) for seed in seeds(24)) > 3
 
 
 def test_a_home_that_is_left_at_the_pins_when_it_is_looked_for_is_looked_for_anew() -> None:
