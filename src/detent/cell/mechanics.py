@@ -254,7 +254,7 @@ class Mechanics:
                 return
             self._supplied = told.on
         else:
-            stage = told.drive.stage if isinstance(told, DriveSet) else told.stage
+            stage = told.stage
             begins = course.power is None
             course.power = Power(stage, 1 / self.rig.drive.current if stage.chops else 1.0)
             course.power.take(sequencer, self.sign * (course.shaft - told.origin), course.rate(told.at))

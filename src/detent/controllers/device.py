@@ -135,6 +135,11 @@ class DriveSet(NamedTuple):
     origin: int
     drive: Drive
 
+    @property
+    def stage(self) -> Stage:
+        """What that is in the terms of a motor, as `StageSet` has it."""
+        return self.drive.stage
+
 
 Output: TypeAlias = (
     Sent | PinSet | MotionStarted | MotionCut | MotionEnded | Displaced | DriveSet | StageSet

@@ -6,6 +6,7 @@ from random import Random
 import pytest
 from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Wire, no_file
+from tests.realtime.boards.test_currents import GENSTEPPER, HALF
 from tests.realtime.boards.test_real_service import Wall
 
 from detent.cell.build import build
@@ -303,22 +304,6 @@ def test_microsteps_are_said_once() -> None:
 
 def test_a_chip_that_cannot_do_what_a_controller_commands_in_a_move_is_refused_before_anything_moves() -> None:
     """A BS0610 changes to full steps at speed (A)."""
-    text = """
-[units.x]
-model = "bs0610"
-[boards.b]
-serial = "fake"
-[hardware.x.X]
-board = "b"
-step = "gpio2"
-dir = "gpio3"
-unwired = ["LX-", "LX+"]
-driver = { kind = "tmc2209", uart = "gpio20", amperes = 0.8 }
-[hardware.x.Y]
-board = "b"
-step = "gpio5"
-dir = "gpio6"
-unwired = ["LY-", "LY+"]
-"""
+    text = GENSTEPPER.replace(HALF, 'driver = { kind = "tmc2209", uart = "gpio20", amperes = 0.8 }')
     with pytest.raises(Problem, match=r"hardware\.x\.X\.driver\.kind: the controller changes its sequence of"):
         Bench(text)

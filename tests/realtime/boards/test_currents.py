@@ -9,6 +9,26 @@ from detent.realtime.boards.registers import CHOPCONF
 from detent.realtime.boards.states import Standing
 from detent.ticks import MS, SECOND, US
 
+HALF = 'driver = { kind = "plain", half = "gpio4" }'
+GENSTEPPER = f"""
+[units.x]
+model = "bs0610"
+[boards.b]
+serial = "fake"
+lead = "60 ms"
+[hardware.x.X]
+board = "b"
+step = "gpio2"
+dir = "gpio3"
+unwired = ["LX-", "LX+"]
+{HALF}
+[hardware.x.Y]
+board = "b"
+step = "gpio5"
+dir = "gpio6"
+unwired = ["LY-", "LY+"]
+"""
+
 
 def test_a_plain_driver_is_not_left_with_all_its_current_when_the_host_dies() -> None:
     text = CELL.replace('enable = "!gpio4"', 'driver = { kind = "plain", half = "gpio9" }')
@@ -115,26 +135,8 @@ def moved(bench: Bench, line: str) -> None:
 
 def test_a_motor_that_ends_its_move_has_all_its_current_to_the_last_step() -> None:
     """A GenStepper lets its motors have less at rest: here a lead later, and later still behind a slip."""
-    text = """
-[units.x]
-model = "bs0610"
-[boards.b]
-serial = "fake"
-lead = "60 ms"
-[hardware.x.X]
-board = "b"
-step = "gpio2"
-dir = "gpio3"
-unwired = ["LX-", "LX+"]
-driver = { kind = "plain", half = "gpio4" }
-[hardware.x.Y]
-board = "b"
-step = "gpio5"
-dir = "gpio6"
-unwired = ["LY-", "LY+"]
-"""
     for stall in (0, 100 * MS):
-        with Bench(text) as bench:
+        with Bench(GENSTEPPER) as bench:
             bench.run(300 * MS)
             bench.send("x", b"X300G")
             bench.run(250 * MS)

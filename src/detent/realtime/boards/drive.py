@@ -19,7 +19,7 @@ from detent.realtime.boards.plan import Plan, plan
 from detent.realtime.boards.port import Port
 from detent.realtime.boards.ports import open_port
 from detent.realtime.boards.replies import HeldStores
-from detent.realtime.boards.stages import can, stages
+from detent.realtime.boards.stages import check_moves, stages
 from detent.realtime.boards.states import News
 from detent.realtime.boards.stepper import LONGEST
 from detent.realtime.boards.warming import first_moves
@@ -58,7 +58,7 @@ class Opened:
         self.plan: Plan = plan(described, trial.controllers(), least_lead)
         self.stages = stages(self.plan, trial)
         """What the power stage of each stepper is told at first."""
-        can(self.plan, first_moves(described))
+        check_moves(self.plan, first_moves(described))
         self.boards: Boards = boards_of(self.plan, real.open_port)
         try:
             self._levels: dict[str, Level] = make_ready(self.boards, self.plan, real.wall, real.sleep)

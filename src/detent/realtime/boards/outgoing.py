@@ -186,7 +186,7 @@ class Outgoing:
                 elif isinstance(entry, (StageSet, DriveSet)):
                     for ledger in ledgers or ():
                         if ledger.what.axis == entry.axis:
-                            ledger.staged(entry.at, entry.stage if isinstance(entry, StageSet) else entry.drive.stage)
+                            ledger.staged(entry.at, entry.stage)
             found = found or ledgers is not None
         return found
 

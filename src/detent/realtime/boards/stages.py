@@ -34,7 +34,7 @@ def stages(plan: Plan, cell: Cell) -> Mapping[str, Stage]:
     return found
 
 
-def can(plan: Plan, moves: Mapping[tuple[str, str], Sequence[Stage]]) -> None:
+def check_moves(plan: Plan, moves: Mapping[tuple[str, str], Sequence[Stage]]) -> None:
     """The driver chips can do what controllers command in their first `moves`, by unit and axis. Problem."""
     drivers = {driver.name: driver for setup, _ in plan.setups for driver in setup.drivers}
     for axis in plan.axes:
@@ -50,5 +50,5 @@ def _commanded(cell: Cell, unit: str, axis: str) -> Stage | None:
     stage = None
     for entry in cell.recording.of(unit, StageSet, DriveSet):
         if isinstance(entry, (StageSet, DriveSet)) and entry.axis == axis:
-            stage = entry.stage if isinstance(entry, StageSet) else entry.drive.stage
+            stage = entry.stage
     return stage

@@ -39,8 +39,7 @@ def first_moves(described: Description) -> Mapping[tuple[str, str], Sequence[Sta
             assert cell.recording is not None
             for entry in cell.recording.of(unit.model, StageSet, DriveSet):
                 if isinstance(entry, (StageSet, DriveSet)):
-                    stage = entry.stage if isinstance(entry, StageSet) else entry.drive.stage
-                    found.setdefault((name, entry.axis), []).append(stage)
+                    found.setdefault((name, entry.axis), []).append(entry.stage)
     return found
 
 
