@@ -26,9 +26,10 @@ class RandomCell:
     `driven_bench.Bench` takes them; `hands` are the other inputs. Every input rests where it is 1.
     """
 
-    def __init__(self, random: Random) -> None:
-        self._random = random
-        self.boards = "ab"[: random.choice([1, 1, 2])]
+    def __init__(self, random: Random, *, most_boards: int = 2, chips: bool = True) -> None:
+        """`chips`: drivers may be some."""
+        self._random, self._chips = random, chips
+        self.boards = "ab"[: random.choice([1, 1, 2])][:most_boards]
         self.lead = random.choice([5, 10, 30, 60])
         self.replies = random.choice(["held", "held", "held", "at once"])
         self.units: list[tuple[str, str]] = []
@@ -126,7 +127,7 @@ class RandomCell:
         kind = self._random.random()
         if kind < 0.3:
             self.text += f'driver = {{ kind = "plain", half = "{self._any(board)}" }}\n'
-        elif kind < 0.5 and model != "bs0610":
+        elif kind < 0.5 and model != "bs0610" and self._chips:
             more = "sense = 0.05, amperes = 1.5" if model == "dcb-274" else "amperes = 0.8"
             more += ", microsteps = 2" if model in ("gs-c200s", "supersigma") else ""
             self.text += f'driver = {{ kind = "tmc2209", uart = "{self._pin(board)}", {more} }}\n'

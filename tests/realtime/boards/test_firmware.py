@@ -1,23 +1,12 @@
-"""The stock firmware itself, where there is one: what it does is what the fake board does.
+"""The stock firmware itself, where there is one: what it does is what the fake board does."""
 
-`DETENT_FIRMWARE_PTY` is the terminal of a running firmware (its Linux process, or a board that may move nothing).
-`DETENT_FIRMWARE_MACHINE` is the shared memory of a stand-in for its GPIO device which counts steps and moves switches:
-64-bit number of records and room for them, 512 levels of inputs, 512 of outputs, 16 axes (int32 step, dir, inverted,
-used, int64 position), 32 switches (int32 used, axis, line, level inside, int64 lowest, highest), then the records
-(uint64 ns, uint16 line, uint16 level, int32 position). Position 15 of the axes is by how much its clock lags behind
-the host's.
-"""
-
-import mmap
-import os
 import select
-import struct
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import TypeVar
 
 import pytest
+from tests.realtime.boards.firmware_process import DIR, MACHINE, STEP, TERMINAL, Machine, with_firmware, with_machine
 
 from detent.axis import Axis, MotionStarted
 from detent.pulses import Train
@@ -37,69 +26,11 @@ from detent.realtime.boards.ports import Look, open_port
 from detent.realtime.boards.setup import BoardSetup, InputSetup, OutSetup, Pin, StepperSetup
 from detent.ticks import MS, SECOND, US, Ns, to_fixed
 
-TERMINAL = os.environ.get("DETENT_FIRMWARE_PTY", "")
-MACHINE = os.environ.get("DETENT_FIRMWARE_MACHINE", "")
-
-pytestmark = pytest.mark.skipif(not TERMINAL, reason="DETENT_FIRMWARE_PTY does not name the terminal of a firmware")
-with_machine = pytest.mark.skipif(not MACHINE, reason="DETENT_FIRMWARE_MACHINE does not name a machine behind its pins")
+pytestmark = with_firmware
 
 E = TypeVar("E")
 
-INPUTS, AXES, SWITCHES, RECORDS = 16, 16 + 1024, 16 + 1024 + 16 * 24, 16 + 1024 + 16 * 24 + 32 * 32
-STEP, DIR, MOV, ENABLE, EOT, HOME = 2, 3, 6, 4, 10, 11
-
-
-class Machine:
-    """The machine behind the pins; none: nothing is known but what the firmware says."""
-
-    def __init__(self, path: str) -> None:
-        self._memory: mmap.mmap | None = None
-        if path:
-            with Path(path).open("r+b") as file:
-                self._memory = mmap.mmap(file.fileno(), 0)
-            memory = self._memory
-            memory[INPUTS : INPUTS + 512] = bytes([1]) * 512
-            struct.pack_into("<iiiiq", memory, AXES, STEP, DIR, 0, 1, self.position)
-            memory[SWITCHES : SWITCHES + 32 * 32] = bytes(32 * 32)
-
-    @property
-    def position(self) -> int:
-        assert self._memory is not None
-        return int(struct.unpack_from("<q", self._memory, AXES + 16)[0])
-
-    def switch(self, line: int, low: int, high: int) -> None:
-        """An input that is low between two positions, high elsewhere."""
-        assert self._memory is not None
-        struct.pack_into("<iiiiqq", self._memory, SWITCHES, 1, 0, line, 0, low, high)
-        self.put(line, not low <= self.position <= high)
-
-    def put(self, line: int, level: bool) -> None:
-        assert self._memory is not None
-        self._memory[INPUTS + line] = int(level)
-
-    def output(self, line: int) -> bool:
-        assert self._memory is not None
-        return bool(self._memory[INPUTS + 512 + line])
-
-    def records(self) -> list[tuple[int, int, int, int]]:
-        """(ns, line, level, position) so far."""
-        assert self._memory is not None
-        count = struct.unpack_from("<Q", self._memory, 0)[0]
-        return [struct.unpack_from("<QHHi", self._memory, RECORDS + 16 * i) for i in range(count)]
-
-    @property
-    def behind(self) -> Ns:
-        """By how much the firmware's clock lags behind the host's."""
-        return 0 if self._memory is None else int(struct.unpack_from("<q", self._memory, AXES + 15 * 24 + 16)[0])
-
-    def begins_anew(self) -> None:
-        """The process starts again, and its clock with no lag; it tells that only when it lags again."""
-        if self._memory is not None:
-            struct.pack_into("<q", self._memory, AXES + 15 * 24 + 16, 0)
-
-    def wall(self) -> Ns:
-        """The clock that the firmware keeps."""
-        return time.monotonic_ns() - self.behind
+MOV, ENABLE, EOT, HOME = 6, 4, 10, 11
 
 
 class Host:

@@ -3,13 +3,13 @@
 Each case is a few raw commands; what is compared is every answer, without its clocks.
 """
 
-import os
 import select
 import time
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from tests.realtime.boards.firmware_process import TERMINAL, with_firmware
 
 from detent.realtime.boards.clock import nearest
 from detent.realtime.boards.dictionary import BARE, Dictionary, Message
@@ -18,8 +18,6 @@ from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.link import Link
 from detent.realtime.boards.ports import open_port
 from detent.ticks import MS
-
-TERMINAL = os.environ.get("DETENT_FIRMWARE_PTY", "")
 
 
 class Raw:
@@ -391,7 +389,7 @@ def test_the_fake_board_keeps_the_rule(rule: Callable[[Raw], None]) -> None:
     prove(rule, "")
 
 
-@pytest.mark.skipif(not TERMINAL, reason="DETENT_FIRMWARE_PTY does not name the terminal of a firmware")
+@with_firmware
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
 def test_the_firmware_keeps_the_rule(rule: Callable[[Raw], None]) -> None:
     prove(rule, TERMINAL)

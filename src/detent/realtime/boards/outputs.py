@@ -128,10 +128,11 @@ class DigitalOut:
     def commit(self, wall: WallNs, heard: WallNs | None = None, firm: Ns = 0) -> bool:
         """Give the board what is due soon, and the watchdog its food. Whether a change waits for `heard`.
 
-        What is set for cell time `firm` or before cannot be taken back: it is given at once.
-
         That is the wall time up to which stops of the board have been heard of (None: there are none). What is late
         already waits for it, as one that took place meanwhile would take it back.
+
+        What is set for cell time `firm` or before cannot be taken back: it is given at once. So is a supply that is
+        switched on, as the steps behind it may not come before it, however long the computer is elsewhere.
         """
         if not self.wants(wall):
             return False
@@ -147,9 +148,9 @@ class DigitalOut:
         while (
             self._pending
             and not (self.of is not None and self.of.waits)
-            and (self._pending[0].tick <= horizon or self._pending[0].at <= firm)
+            and (self._pending[0].tick <= horizon or self._pending[0].at <= firm or self._switches_on())
         ):
-            if known is not None and known < self._pending[0].tick < soonest:
+            if known is not None and known < self._pending[0].tick < soonest and not self.setup.supply:
                 waits = True
                 break
             change, before = self._pending.popleft(), self.level
@@ -162,6 +163,10 @@ class DigitalOut:
         if self._hungry(wall):
             self._feed(wall)
         return waits
+
+    def _switches_on(self) -> bool:
+        """Whether the next change gives a power stage its supply."""
+        return self.setup.supply and self._pending[0].level
 
     def _tell(self, change: _Change, came: int) -> None:
         """It was given for tick `came`: say so, if it was late."""

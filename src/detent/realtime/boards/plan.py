@@ -163,7 +163,8 @@ def _axis(
     keys[key] = where
     if table.enable is not None:
         axis = axis._replace(enable=f"{key}.enable")
-        here.outs.append(OutSetup(axis.enable, Pin.parse(table.enable), watchdog=board.watchdog, unit=axis.unit))
+        enable = OutSetup(axis.enable, Pin.parse(table.enable), watchdog=board.watchdog, unit=axis.unit, supply=True)
+        here.outs.append(enable)
         keys[axis.enable] = f"{where}.enable"
     driver = table.driver
     if driver is not None and driver.kind == "plain":

@@ -79,6 +79,7 @@ class OutSetup:
 
     `initial` is how it comes up, `off` what it falls to at a shutdown, and, with a `watchdog`, when nobody has
     refreshed it for so long (the firmware then shuts down). It is late together with the axes of its `unit`.
+    `supply`: it is active while the unit has its supply, which no stop takes back.
     """
 
     name: str
@@ -87,6 +88,7 @@ class OutSetup:
     off: bool = False
     watchdog: Ns | None = None
     unit: str = ""
+    supply: bool = False
 
 
 @dataclass(frozen=True, slots=True)
