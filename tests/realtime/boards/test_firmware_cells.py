@@ -63,15 +63,18 @@ class ProcessPins(Pins):
         super().__init__()
         self._machine, self._frequency = machine, frequency
         self.lines: dict[int, str] = {}  # outputs
+        self.first: dict[int, bool] = {}  # their levels, before any record
         self.clocks: dict[int, tuple[str, bool, int]] = {}  # step line -> axis, reversed, level of its pulse
 
     def look(self) -> None:
         """Take what was seen up to now; times are ticks since anything."""
-        self.edges.clear()
         self.steps.clear()
+        self.edges = [(0, name, self.first[line]) for line, name in self.lines.items()]
+        levels = dict(self.first)
         for ns, line, level, place in self._machine.records():
             tick = ns * self._frequency // SECOND
-            if line in self.lines:
+            if line in self.lines and levels[line] is not bool(level):
+                levels[line] = bool(level)
                 self.edges.append((tick, self.lines[line], bool(level)))
             elif line in self.clocks and level == self.clocks[line][2]:
                 name, reverse, _ = self.clocks[line]
@@ -86,6 +89,8 @@ class ProcessPins(Pins):
 
 class ProcessBench(Bench):
     """A cell behind the pins of the process, in real time. As `Bench`, and its clock is the process's."""
+
+    glitch = 10_000  # 200 us: it does one thing after the other
 
     def __init__(self, text: str, switches: Mapping[str, tuple[str, int, int]]) -> None:
         self.process = machine = Machine(MACHINE)
@@ -125,6 +130,7 @@ class ProcessBench(Bench):
             self.process.switch(int(inputs[name].name[4:]), low, high, number=number, axis=n,
                                 inside=inputs[name].active_low)  # fmt: skip
         self.process.forget()
+        pins.first = {line: self.process.output(line) for line in pins.lines}
 
     @property
     def wall(self) -> Ns:  # type: ignore[override]

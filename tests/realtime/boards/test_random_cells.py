@@ -11,6 +11,7 @@ import pytest
 from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench
 from tests.realtime.boards.random_cells import RandomCell
+from tests.realtime.boards.test_failures import lossy
 from tests.realtime.boards.test_stalls import EXPOSED
 
 from detent.realtime.boards.states import Standing, Weight
@@ -22,8 +23,9 @@ class Session:
 
     HAPPENS: Sequence[str] = ("unplugged", "restarted", "stopped", "recovered", "recovered")
 
-    def __init__(self, seed: int, *, rough: bool) -> None:
-        self.random, self.rough = Random(seed), rough
+    def __init__(self, seed: int, *, rough: bool, loss: float = 0.0) -> None:
+        """`loss`: so many of the pieces on the wire are lost, doubled or damaged."""
+        self.random, self.rough, self.loss = Random(seed), rough, loss
         self.cell = self.make_cell()
         self.befallen, self.stalled, self.restarted = False, False, set[str]()
         self.away, self.late = 0.0, False
@@ -43,10 +45,13 @@ class Session:
         def away(_: bool) -> Ns:
             return random.randrange(90 * MS) if self.late and random.random() < self.away else 0
 
+        spoil = lossy(Random(random.random()), self.loss) if self.loss else None
         return Bench(
             self.cell.text, switches=self.cell.switches, jitter=lambda: random.randrange(jitter), away=away,
             spare_exposed=True, chips=True,
-            port={"drift": random.choice([0.0, 60.0, -90.0]), "delay": random.choice([30, 100, 800]) * US},
+            port={
+                "drift": random.choice([0.0, 60.0, -90.0]), "delay": random.choice([30, 100, 800]) * US, "spoil": spoil,
+            },
         )  # fmt: skip
 
     def exposed(self) -> bool:
@@ -185,3 +190,13 @@ def test_cells_that_lost_something_once(seed: int, rough: bool) -> None:
 @pytest.mark.parametrize("first", range(1000, 2000, 250))
 def test_nothing_is_lost_in_many_cells(first: int, rough: bool) -> None:
     assert sum(Session(seed, rough=rough).run() for seed in range(first, first + 250)) > 100
+
+
+def test_a_bad_wire_loses_nothing_in_any_cell() -> None:
+    assert sum(Session(seed, rough=False, loss=0.01).run() for seed in seeds(12)) > 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(1000, 1400, 100))
+def test_a_bad_wire_loses_nothing_in_many_cells(first: int) -> None:
+    assert sum(Session(seed, rough=False, loss=0.01).run() for seed in range(first, first + 100)) > 40

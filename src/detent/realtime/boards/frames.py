@@ -85,11 +85,16 @@ def read_integer(data: bytes, at: int) -> tuple[int, int]:
 
 
 class Reader:
-    """Finds blocks in a stream of bytes; what is damaged is passed over up to the next end mark, and counted."""
+    """Finds blocks in a stream of bytes; what is damaged is passed over up to the next end mark, and counted.
 
-    __slots__ = ("_data", "_lost", "damaged")
+    One whose length is damaged is waited for no longer than until another has come whole behind it. A `patient` reader
+    waits for as many bytes as the length says, whatever they are; the firmware is one.
+    """
 
-    def __init__(self) -> None:
+    __slots__ = ("_data", "_lost", "_patient", "damaged")
+
+    def __init__(self, *, patient: bool = False) -> None:
+        self._patient = patient
         self._data = bytearray()
         self._lost = False  # looking for an end mark
         self.damaged = 0
@@ -116,20 +121,38 @@ class Reader:
                 self._give_up()
                 continue
             if len(waiting) - at < length:
-                # a damaged length would wait for ever: the second byte tells as soon as it is there
-                if len(waiting) - at > 1 and waiting[at + 1] & 0xF0 != DESTINATION:
+                # a damaged length would wait for long: the second byte tells, or a whole block that has come behind it
+                if (len(waiting) - at > 1 and waiting[at + 1] & 0xF0 != DESTINATION) or self._whole_behind(at):
                     self._give_up()
                     continue
                 break
-            body = bytes(waiting[at : at + length])
-            if (body[1] & 0xF0 != DESTINATION or body[-1] != END
-                    or checksum(body[:-3]) != body[-3] << 8 | body[-2]):  # fmt: skip
+            block = self._whole(at)
+            if block is None:
                 self._give_up()
                 continue
-            found.append(Block(body[1] & 0xF, body[2:-3]))
+            found.append(block)
             at += length
         del waiting[:at]
         return found
+
+    def _whole(self, at: int) -> Block | None:
+        """The block that stands there, if one does and all of it has come."""
+        body = bytes(self._data[at : at + self._data[at]])
+        if len(body) != body[0] or not SMALLEST <= len(body) <= LARGEST or body[1] & 0xF0 != DESTINATION:
+            return None
+        if body[-1] != END or checksum(body[:-3]) != body[-3] << 8 | body[-2]:
+            return None
+        return Block(body[1] & 0xF, body[2:-3])
+
+    def _whole_behind(self, at: int) -> bool:
+        """Whether a block has come whole behind an end mark behind `at`."""
+        data = self._data
+        end = -1 if self._patient else data.find(END, at)
+        while 0 <= end < len(data) - SMALLEST:
+            if self._whole(end + 1) is not None:
+                return True
+            end = data.find(END, end + 1)
+        return False
 
     def _give_up(self) -> None:
         self.damaged += 1

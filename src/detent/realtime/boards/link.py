@@ -10,7 +10,7 @@ The number at the start is not known, as a board keeps it while hosts come and g
 from collections import deque
 from typing import NamedTuple
 
-from detent.realtime.boards.frames import END, ROOM, SEQUENCES, SMALLEST, Block, Reader, block
+from detent.realtime.boards.frames import END, LARGEST, ROOM, SEQUENCES, SMALLEST, Block, Reader, block
 from detent.realtime.boards.undo import Undo
 from detent.realtime.pace import WallNs
 from detent.ticks import MS
@@ -18,6 +18,7 @@ from detent.ticks import MS
 MOST_UNDER_WAY = 7  # blocks; a board tells 16 apart, and what it said of as many before may come twice
 FIRST_PATIENCE: WallNs = 25 * MS  # without an acknowledgement, before blocks are sent again; doubles each time
 MOST_PATIENCE: WallNs = 1000 * MS
+FILL = bytes((END,)) * LARGEST  # what a board waits for that has got a block with a damaged length
 NAK_QUIET: WallNs = 3 * MS  # requests that follow each other so closely are about the same loss
 
 
@@ -170,6 +171,7 @@ class Link:
         if not self.synced:
             self.sync(wall)
         elif self._under_way:
+            self._out += FILL
             self._repeat(wall)
             self._patience = min(2 * self._patience, MOST_PATIENCE)
             self._again_at = wall + self._patience

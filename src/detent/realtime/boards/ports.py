@@ -72,6 +72,9 @@ class SerialPort:
         except BlockingIOError as error:
             self.close()
             raise PortError(f"{device} is in use by another program; end that first") from error
+        except FileNotFoundError as error:
+            self.close()
+            raise PortError(f"{device} was unplugged as it was opened; plug it in again") from error
         except (OSError, TerminalError, ValueError) as error:
             self.close()
             why = str(error.args[-1]).lower()
@@ -80,7 +83,8 @@ class SerialPort:
     def _set_baud(self) -> None:
         import serialx
 
-        os.close(self._descriptor)
+        descriptor, self._descriptor = self._descriptor, -1
+        os.close(descriptor)
         port = serialx.Serial(self._device, int(self._baud))  # type: ignore[abstract]  # this system's own class
         port.open()
         self._port, self._descriptor = port, port.fileno()

@@ -46,7 +46,7 @@ class FakeBoard:
         self._reasons = {text: n + 2 for n, text in enumerate(words.REASONS)}
         self._pins = dict(enumerate(self.dictionary.pins))
         self._sequence = sequence
-        self._reader = Reader()
+        self._reader = Reader(patient=True)
         self._valid = True
         self.gone = False  # a reset takes the connection away; whoever has it opens it again
         self.resets = 0
@@ -289,7 +289,7 @@ class FakeBoard:
         self.clear()
         self.sent.clear()
         self._sequence = 0
-        self._reader = Reader()
+        self._reader = Reader(patient=True)
         self.gone = True
         self.resets += 1
 
