@@ -1,6 +1,7 @@
 """A bench in virtual time: boards, what is behind them, and an axis of a cell, without any waiting."""
 
 from collections.abc import Callable, Sequence
+from random import Random
 from typing import Any, TypeVar
 
 from detent.axis import Axis, MotionCut, MotionEnded, MotionStarted
@@ -150,3 +151,20 @@ def bench(
     if start:
         assert [type(event) for event in made.events] == [Ready]
     return made
+
+
+def lossy(random: Random, chance: float) -> Callable[[bytes, bool], list[bytes]]:
+    """What a bad wire does to so many of the pieces: they are lost, doubled, or damaged."""
+
+    def spoil(data: bytes, to_board: bool) -> list[bytes]:
+        what = random.random()
+        if what > chance:
+            return [data]
+        if what < chance / 3:
+            return []
+        if what < chance * 2 / 3:
+            return [data, data]
+        place = random.randrange(len(data))
+        return [data[:place] + bytes([data[place] ^ 1 << random.randrange(8)]) + data[place + 1 :]]
+
+    return spoil

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from tests.generated import seeds
-from tests.realtime.boards.bench import ENABLE, EOT, MOV, SLIDE, Bench, bench, setup, slide
+from tests.realtime.boards.bench import ENABLE, EOT, MOV, SLIDE, Bench, bench, lossy, setup, slide
 
 from detent.ramps import constant_acceleration
 from detent.realtime.boards.board import State
@@ -361,21 +361,6 @@ def test_a_board_is_looked_at_and_left_as_it_was() -> None:
     assert len(found.pins) == 64
     assert found.missing == ("config_tmcuart", "tmcuart_send")
     assert not fake.finalized
-
-
-def lossy(random: Random, chance: float) -> Callable[[bytes, bool], list[bytes]]:
-    def spoil(data: bytes, to_board: bool) -> list[bytes]:
-        what = random.random()
-        if what > chance:
-            return [data]
-        if what < chance / 3:
-            return []
-        if what < chance * 2 / 3:
-            return [data, data]
-        place = random.randrange(len(data))
-        return [data[:place] + bytes([data[place] ^ 1 << random.randrange(8)]) + data[place + 1 :]]
-
-    return spoil
 
 
 @pytest.mark.parametrize("seed", seeds(8))

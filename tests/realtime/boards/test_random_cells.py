@@ -9,9 +9,9 @@ from random import Random
 
 import pytest
 from tests.generated import seeds
+from tests.realtime.boards.bench import lossy
 from tests.realtime.boards.driven_bench import Bench
 from tests.realtime.boards.random_cells import RandomCell
-from tests.realtime.boards.test_failures import lossy
 from tests.realtime.boards.test_stalls import EXPOSED
 
 from detent.realtime.boards.states import Standing, Weight

@@ -4,12 +4,12 @@ from random import Random
 
 import pytest
 from tests.generated import seeds
-from tests.realtime.boards.bench import Bench, bench
+from tests.realtime.boards.bench import Bench, bench, lossy
 
 from detent.axis import MotionStarted
 from detent.pulses import Train, Uniform
 from detent.ramps import constant_acceleration
-from detent.realtime.boards.events import CountDiffers, InputChanged, Stopped
+from detent.realtime.boards.events import CountDiffers, InputChanged, Ready, Stopped
 from detent.realtime.boards.fake.machine import MachineSwitch
 from detent.realtime.boards.guard import Guard
 from detent.ticks import MS, SECOND, US
@@ -246,6 +246,42 @@ def test_a_lost_report_is_followed_by_another() -> None:
     made.until(lambda: bool(made.of(Stopped)))
     assert len(dropped) == 6
     assert made.of(Stopped)[0].shaft == 500
+
+
+def told_in_order(seed: int) -> None:
+    """A hand at the inputs, before a stop and behind it, and a wire on which answers are lost."""
+    random = Random(seed)
+    usual, bad = lossy(random, 0.3), False
+
+    def spoil(data: bytes, to_board: bool) -> list[bytes]:
+        return usual(data, to_board) if bad and not to_board else [data]
+
+    made = bench(port={"spoil": spoil})
+    made.machine.set("gpio10", True, made.board.now)
+    made.run(20 * MS)
+    move(made, 2000, 1)
+    made.run(60 * MS)
+    bad = True
+    for _ in range(8):
+        made.machine.set(random.choice(["gpio10", "gpio11"]), random.random() < 0.5, made.board.now)
+        made.run(random.randrange(20 * MS) + 1)
+    bad = False
+    made.run(600 * MS)
+    [ready] = made.of(Ready)
+    levels = dict(ready.inputs)
+    for event in made.events:
+        if isinstance(event, Stopped):
+            levels |= event.levels
+        elif isinstance(event, InputChanged):
+            levels[event.input] = event.level
+    assert levels == made.boards.master.inputs
+    assert levels == {"EOT": made.machine.level("gpio10"), "HOME": not made.machine.level("gpio11")}
+
+
+def test_events_say_in_their_order_what_every_input_is_at() -> None:
+    """A stop that was long in coming, for want of an answer, does not say again what an input was at before."""
+    for seed in seeds(60):
+        told_in_order(seed)
 
 
 def test_the_host_hears_of_it_within_the_lead_and_some_ms() -> None:

@@ -40,7 +40,7 @@ class Equipment:
                 if stepper.stops is None or entry.name in stepper.stops:
                     mine[entry.name] = entry, self._oid()
                     stoppers.setdefault(entry.name, mine[entry.name][1])
-            self.stops[stepper.name] = Stop(core, axis, self._oid(), mine, self._heard)
+            self.stops[stepper.name] = Stop(core, axis, self._oid(), mine, self._heard, self._level)
         self.inputs = Inputs(core, setup.inputs, stoppers, self.stops, self._oid)
         self.starved = False  # steps had to wait for room on the wire
         self.outs = {out.name: DigitalOut(core, out, self._oid()) for out in setup.outs}
@@ -54,6 +54,9 @@ class Equipment:
 
     def _heard(self, name: str, level: bool, wall: WallNs) -> None:
         self.inputs.heard(name, level, wall)
+
+    def _level(self, name: str) -> bool:
+        return self.inputs.levels[name]
 
     def _wire(self, chip: DriverSetup) -> Wire:
         key = ("uart", chip.uart.name) if chip.uart is not None else ("spi", chip.select.name if chip.select else "")

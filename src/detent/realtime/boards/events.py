@@ -35,8 +35,9 @@ class Stopped(NamedTuple):
 
     `at` is the cell time of the stop (its tick, less lead and lag): no pulse came behind it, and all before it came.
     `edge` is that of the first sample which showed the level. `shaft` is the firmware's count as a shaft position.
-    `present` is the level of the input when it was asked for afterwards: a glitch may be over. `levels` are those of
-    every input that may stop this stepper, asked for together: while it stands, what follows it stands as well.
+    `present` is the level of the input, which was asked for afterwards: a glitch may be over. `levels` are those of
+    every input that may stop this stepper, asked for together: while it stands, what follows it stands as well. One
+    that was reported to have changed since has its newest level.
     `dry`: no input has stopped it, but its next pulses did not come in time; it happened about one of these cell times.
     """
 

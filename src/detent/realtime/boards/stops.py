@@ -42,11 +42,14 @@ class Stop:
 
     def __init__(
         self, core: Core, stepper: Stepper, oid: int, inputs: Mapping[str, tuple[InputSetup, int]],
-        read: Callable[[str, bool, WallNs], None],
+        read: Callable[[str, bool, WallNs], None], level: Callable[[str], bool],
     ) -> None:  # fmt: skip
-        """`inputs`: by name, with the oid of an endstop each. `read` is told the level of an input that was asked."""
+        """`inputs`: by name, with the oid of an endstop each. `read` is told the level of an input that was asked.
+
+        `level` is what an input is at, as was heard last.
+        """
         self.stepper, self.oid = stepper.name, oid
-        self._core, self._axis, self._read = core, stepper, read
+        self._core, self._axis, self._read, self._level = core, stepper, read, level
         self._inputs = {name: _Watched(*found, n) for n, (name, found) in enumerate(inputs.items(), 1)}
         self._armed: dict[str, bool] = {}
         self._levels: dict[str, bool] = {}  # for which each was armed last
@@ -322,7 +325,6 @@ class Stop:
         self._axis.halt(dry=reason == DRY)
         name = watched.setup.name if watched is not None else ""
         level = self._levels.get(name, True)
-        levels: dict[str, bool] = {}
         self._firing = Stopped(core.setup.name, self.stepper, name, level, 0, 0, 0, level)
         if reason == DRY:
             ends = tuple(core.scale.later(self._axis.lag_at(tick)).time(tick) for tick, _ in self._before)
@@ -341,16 +343,18 @@ class Stop:
             else:
                 asked = next(one for one in self._inputs.values() if one.oid == message.number("oid"))
                 present = bool(message.number("pin_value")) is not asked.setup.pin.active_low
-                levels[asked.setup.name] = present
                 self._read(asked.setup.name, present, at)
                 if asked is watched and self._firing is not None:
                     sample = core.ticks(asked.setup.sample)
                     edge = core.whole(message, "next_clock", at) - sample
                     stop = edge + (asked.setup.samples - 1) * sample
                     scale = base.later(self._axis.lag_at(stop))
-                    self._firing = self._firing._replace(at=scale.time(stop), edge=scale.time(edge), present=present)
+                    self._firing = self._firing._replace(at=scale.time(stop), edge=scale.time(edge))
             if not waiting and self._firing is not None:
-                core.events.append(self._firing._replace(shaft=self._axis.counted(), levels=levels))
+                # an answer that was lost takes its time: what was reported since one was asked is newer than its answer
+                levels = {one: self._level(one) for one in self._inputs}
+                fired = self._firing._replace(present=levels.get(name, level), levels=levels)
+                core.events.append(fired._replace(shaft=self._axis.counted()))
                 self._firing = None
                 self._quiet()
 
