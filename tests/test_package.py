@@ -137,7 +137,7 @@ def test_a_verb_that_needs_an_extra_says_so_in_one_line(
 @pytest.mark.slow
 @pytest.mark.parametrize("extra", sorted(EXTRAS))
 def test_each_extra_brings_what_it_says(extra: str, wheel: Path, tmp_path: Path) -> None:
-    environment = Environment(tmp_path / "env", wheel, extra)
+    environment = Environment(tmp_path / "env", wheel, "distributed,fast" if extra == "distributed" else extra)
     must(environment.python, "-c", f"import {EXTRAS[extra]}")
     if extra == "figures":
         assert environment("run", "gs-c200", "--send", "+10", "--plot", "p.png", cwd=tmp_path).returncode == 0
@@ -145,3 +145,20 @@ def test_each_extra_brings_what_it_says(extra: str, wheel: Path, tmp_path: Path)
     elif extra == "fast":
         done = environment("motor", "qsh4218-41-10-035", "--supply", "24", cwd=tmp_path)
         assert done.returncode == 0, done.stderr
+    elif extra == "epics":
+        done = environment("epics", "gs-c200", "--list-pvs", cwd=tmp_path)
+        assert "SIM:m1.VAL" in done.stdout, done.stderr
+    elif extra == "distributed":
+        done = environment("tune", "gs-c200", *RIG, "--workers", "2", "--variants", "16", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert "S=" in done.stdout
+    elif extra == "workbench":
+        process = subprocess.Popen(
+            [environment.detent, "workbench", "gs-c200", "--port", "0"], cwd=tmp_path, env=environment.variables,
+            stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        with process:
+            assert process.stdout is not None
+            assert any("http://127.0.0.1:" in line for line in process.stdout)
+            process.terminate()
+        assert process.returncode == 0

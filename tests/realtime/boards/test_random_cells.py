@@ -161,17 +161,28 @@ class Session:
         """How many stops there were."""
         with self.bench:
             self.live()
-            self.befallen = self.befallen or self.exposed()
-            if self.befallen:
-                for pin in self.cell.hands:
-                    self.bench.press(pin, 1)
-                self.bench.run(400 * MS)
-                self.bench.come_back()
-                self.bench.come_back()
-            self.cell.bring_to_rest(self.bench)
-            self.bench.rest(20 * SECOND)
-            self.bench.run(1200 * MS)  # the settling time of a DCB-274, behind which it holds
+            if self.befallen or self.exposed():
+                self.befall_no_more()
+            self.come_to_rest()
+            if not self.befallen and self.exposed():  # on the way there
+                self.befall_no_more()
+                self.come_to_rest()
             return self.check()
+
+    def befall_no_more(self) -> None:
+        """Hands are let go, and somebody recovers what stands."""
+        self.befallen = True
+        for pin in self.cell.hands:
+            self.bench.press(pin, 1)
+        self.bench.run(400 * MS)
+        self.bench.come_back()
+        self.bench.come_back()
+
+    def come_to_rest(self) -> None:
+        """With everything that is due behind it."""
+        self.cell.bring_to_rest(self.bench)
+        self.bench.rest(20 * SECOND)
+        self.bench.run(1200 * MS)  # the settling time of a DCB-274, behind which it holds
 
 
 @pytest.mark.parametrize("rough", [False, True])
