@@ -17,8 +17,8 @@ AXE := axe-core@4.14.1
 TSC := typescript@5.9.3
 
 # Compiled test files are kept between runs, also where the environment says that Python shall write none: 11 s a worker.
-# On two processors a third worker has something to do where those with a browser or a line in real time wait.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(PYTHON) -m pytest -n 3 --dist loadgroup -rs
+# On two processors four workers have something to do where those with a browser or a line in real time wait.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(PYTHON) -m pytest -n 4 --dist loadgroup -rs
 
 .PHONY: setup system axe tsc run test test-all check bench fuzz chaos soak pythons lock docs clean
 

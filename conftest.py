@@ -44,13 +44,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Tests that share a fixture of their file run in one process under `pytest --dist loadgroup`: it is made once.
+    """Those that mostly wait (`waits`) begin first, so that others compute meanwhile and no worker ends long behind.
+
+    Tests that share a fixture of their file run in one process under `pytest --dist loadgroup`: it is made once.
 
     A group is the end of a name, behind `@`: the file, or what a mark says (what xdist writes there for one, pytest 9
     does not read).
     """
     if not config.getoption("loadgroup", False):  # set in a worker only
         return
+    items.sort(key=lambda item: item.get_closest_marker("waits") is None)
     for item in items:
         shared = getattr(item, "_fixtureinfo", None)
         fixtures = [found for all_ in shared.name2fixturedefs.values() for found in all_] if shared else []

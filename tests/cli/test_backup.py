@@ -16,6 +16,8 @@ from detent.hosts.errors import DriverError
 from detent.hosts.gsc200 import BlockingGsC200
 from detent.realtime.connect import connect
 
+pytestmark = pytest.mark.waits
+
 
 @pytest.fixture(autouse=True)
 def state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:

@@ -7,6 +7,8 @@ from tests.realtime.served import address, served
 from detent.cli import main
 from detent.realtime.connect import connect
 
+pytestmark = pytest.mark.waits
+
 SOURCE = "; blinks\nagain: A1\n  D1 ; a tenth of a second\n  C1\n  j again\n"
 
 

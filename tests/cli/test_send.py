@@ -7,6 +7,8 @@ from tests.realtime.served import address, served
 from detent.cli import main
 from detent.cli.send import escaped, unescaped
 
+pytestmark = pytest.mark.waits
+
 
 def told(capsys: pytest.CaptureFixture[str], *words: str, status: int = 0) -> tuple[str, str]:
     with pytest.raises(SystemExit) as ended:

@@ -32,8 +32,7 @@ def main() -> int:
         return any(row.wrong for row in rows)
     if asked.proof == "soak":
         with tempfile.TemporaryDirectory(prefix="detent-soak-") as folder:
-            tell = lambda text: print(text, end="   \r", file=sys.stderr)  # noqa: E731
-            return not soak.run(asked.hours, asked.seconds, Path(folder), tell)
+            return not soak.run(asked.hours, asked.seconds, Path(folder), soak.aloud)
     found = fuzz.run(asked.seconds, asked.frames, asked.jobs, asked.first, lambda text: print(text, file=sys.stderr))
     fuzz.print_table(found, time.monotonic() - began)
     return any(tally.failures for tally in found.values())

@@ -1,6 +1,6 @@
 """``make soak``: a day of virtual time and an hour of real time under noise: nothing grows, all is equal.
 
-The virtual day is lived twice: the second one must give the same pulses and the same last state, to the byte.
+The virtual day is lived twice, by two processes: they must give the same pulses and the same last state, to the byte.
 """
 
 import hashlib
@@ -11,10 +11,13 @@ import re
 import resource
 import select
 import socket
+import sys
 import threading
 import time
 import urllib.request
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 from typing import Any, Final, NamedTuple
@@ -81,6 +84,7 @@ class Day(NamedTuple):
     digest: str  # of the last state of everything
     lines: int  # said by the hosts
     grown: int  # bytes of memory, behind the first tenth
+    largest: int  # bytes of memory, at most
     took: float  # seconds
 
 
@@ -112,7 +116,8 @@ def virtual(time_: Ns, seed: int, tell: Callable[[str], None]) -> Day:
             status = controller.status(cell.now, axis)
             pulses[f"{name} {axis}".strip()] = status.pulses
             digest.update(repr((name, status, controller.registers(cell.now), controller.program_memory())).encode())
-    return Day(pulses, digest.hexdigest(), lines, memory() - first, time.monotonic() - began)
+    largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
+    return Day(pulses, digest.hexdigest(), lines, memory() - first, largest, time.monotonic() - began)
 
 
 def _noise(cell: Cell, draw: Random) -> int:
@@ -204,28 +209,39 @@ def _client(port: int, seed: int, count: list[int], ending: threading.Event) -> 
             continue  # another client has it still
 
 
+def aloud(text: str) -> None:
+    """Tell how far it is, in a line that the next one overwrites."""
+    print(text, end="   \r", file=sys.stderr)
+
+
+def silent(_: str) -> None:
+    """Do not tell how far it is: another one does, or nobody looks."""
+
+
 def run(hours: float, seconds: float, folder: Path, tell: Callable[[str], None]) -> bool:
-    """Both; prints the table. Whether all is well."""
-    days = [virtual(round(hours * 3600) * SECOND, 1, tell) for _ in range(2)]
+    """Both; prints the table. Whether all is well. `tell` is `aloud` or `silent`: it goes to another process."""
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as beside:
+        lived = [beside.submit(virtual, round(hours * 3600) * SECOND, 1, each) for each in (tell, silent)]
+        first, second = (one.result() for one in lived)
     hour = real(seconds, folder, tell)
-    first, second = days
     late = [f"{hour.late[name] / 1e6:.3f}" for name in ("p50", "p99", "most")]
+    grown = max(first.grown, second.grown)
     same = (first.pulses, first.digest) == (second.pulses, second.digest)
     rows = [
         ("machine", f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, "
                     f"{time.strftime('%Y-%m-%d')}", True),
-        ("virtual time", f"{hours:g} h, twice, in {first.took:.0f} and {second.took:.0f} s", True),
+        ("virtual time", f"{hours:g} h, twice, side by side, in {first.took:.0f} and {second.took:.0f} s", True),
         ("lines of the hosts", f"{first.lines:,}", True),
         ("pulses", f"{sum(first.pulses.values()):,}", bool(sum(first.pulses.values()))),
         ("the second run", "equal in pulses, answers and state" if same else "other pulses, answers or state", same),
-        ("memory behind the first tenth", f"{second.grown / 1e6:+.1f} MB", second.grown < MOST_GROWTH),
+        ("memory behind the first tenth", f"{grown / 1e6:+.1f} MB", grown < MOST_GROWTH),
         ("real time", f"{seconds:g} s, {hour.lines:,} lines, {hour.answers:,} times answers", hour.answers > 0),
         ("memory behind the first tenth", f"{hour.grown / 1e6:+.1f} MB", hour.grown < MOST_GROWTH),
         ("descriptors", f"{hour.descriptors[0]}, then {hour.descriptors[1]}",
          hour.descriptors[1] <= hour.descriptors[0] + 8),
         ("lateness of deadlines", f"{hour.late['deadlines']:,}: {late[0]} ms (half), {late[1]} ms (99 %), "
                                   f"{late[2]} ms (all)", True),
-        ("largest memory of this process", f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3:.0f} MB", True),
+        ("largest memory of a process", f"{max(first.largest, second.largest) / 1e6:.0f} MB", True),
     ]  # fmt: skip
     for name, told, well in rows:
         print(f"{name:34} {told}{'' if well else '   <- wrong'}")

@@ -93,6 +93,22 @@ def test_stop_and_recover(tmp_path: Path) -> None:
     play(scene, tmp_path)
 
 
+def test_outputs_that_a_stop_has_put_at_rest_are_told_where_the_panel_shows_what_the_cell_has(tmp_path: Path) -> None:
+    async def scene(bench: Bench) -> None:
+        await bench.type("x", "A1")
+        await bench.until(lambda state: state.units["x"].pins.get("UO1") == 1)
+        await bench.stop_motors()
+        state = await bench.until(lambda state: state.real is not None and state.real.standing == "fault")
+        assert state.real is not None
+        assert state.real.why == "x: emergency stop; at rest on their pins, whatever is shown: x.UO1"
+        await bench.recover()
+        await bench.until(lambda state: state.real is not None and state.real.standing == "driven")
+        assert bench.state.real is not None
+        assert bench.state.real.why == ""
+
+    play(scene, tmp_path, CELL + 'outputs = { UO1 = "gpio6", RDY = "gpio7" }\n')
+
+
 def test_a_process_that_does_not_take_a_stop_is_ended_and_that_is_told(tmp_path: Path) -> None:
     """Boards stop when nobody drives them; one that hangs would go on with what it has planned when it wakes."""
 

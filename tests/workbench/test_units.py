@@ -33,6 +33,8 @@ from detent.workbench.units.asked import look
 from detent.workbench.units.registry import Units
 from detent.workbench.units.unit import UnitBusy, options_of
 
+pytestmark = pytest.mark.waits
+
 DRIVERS: dict[str, Callable[[HostPort], Any]] = {
     "gs-c200": lambda port: BlockingGsC200(GsC200(), port),
     "gs-c200s": lambda port: BlockingGsC200(GsC200("gs-c200s"), port),

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from detent.cell.cell import Cell
 from detent.pins import Level
 from detent.realtime.boards.axis_ledger import AxisLedger
+from detent.realtime.boards.board import State
 from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.events import Stopped
 from detent.realtime.boards.faults import Faults
@@ -90,6 +91,15 @@ class Driven:
     def lag(self) -> Ns:
         """How much later than the lead the pins are at present: the latest axis."""
         return self.outgoing.certainty.lag
+
+    def outputs_at_rest(self) -> list[str]:
+        """Outputs of units whose board has stopped or is gone, so that they have another level than in the cell."""
+        boards, found = self.boards, list[str]()
+        for name in self.plan.outs.values():
+            stands = boards.boards[boards.home[name]].state is not State.READY
+            if stands and self.outgoing.level_of(name) is not boards.outs[name].setup.off:
+                found.append(name)
+        return found
 
     @property
     def abandoned(self) -> bool:

@@ -100,6 +100,11 @@ class Outgoing:
                 self.set(out, False, self.cell.now, fresh=True)
         self.past.keep()
 
+    def level_of(self, name: str) -> bool:
+        """What an output is at in the cell."""
+        out = next(out for out in self.outs.values() if out.name == name)
+        return out.levels.before(out.levels.count)[-1][1]
+
     def commit(self) -> None:
         """Give the boards what is certain, at once."""
         self.currents.follow(self.ledgers)  # steps that need it leave now, and nobody knows when this goes on
