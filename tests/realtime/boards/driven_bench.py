@@ -116,7 +116,8 @@ def machine_of(described: Description, made: Plan, board: str, switches: Mapping
     axes = {}
     for stepper in setup.steppers:
         minus = None if stepper.minus is None else stepper.minus.name
-        axes[stepper.name] = MachineAxis(stepper.step.name, stepper.dir.name, stepper.dir.active_low, minus)
+        reverse = stepper.dir.active_low and minus is None
+        axes[stepper.name] = MachineAxis(stepper.step.name, stepper.dir.name, reverse, minus)
     found = []
     for put in setup.inputs:
         if put.name in switches:
@@ -304,21 +305,10 @@ class Bench:
         for out in self.driven.outgoing.outs.values():
             board = next(name for name, board in self.boards.boards.items() if out.name in board.outs)
             setup, edges = self.boards.outs[out.name].setup, self.machines[board].edges
-            found: list[tuple[int, bool]] = []
-            for tick, pin, level in edges:
-                if pin == setup.pin.name and found and tick <= found[-1][0] + self.glitch:
-                    found.pop()  # it had been given to the board for too soon a time, and was set right as it came
-                elif pin == setup.pin.name:
-                    found.append((tick, level is not setup.pin.active_low))
-            wanted = [(-1, setup.initial)]
-            for at, level in out.levels.since(1):
-                if at == wanted[-1][0]:
-                    wanted.pop()  # for a tick
-                else:
-                    wanted.append((at, level))
-            assert [level for _, level in found] == [level for level, _ in groupby(level for _, level in wanted)], (
-                out.name
-            )
+            seen = [(tick, level is not setup.pin.active_low) for tick, pin, level in edges if pin == setup.pin.name]
+            wanted = [(-1, setup.initial), *out.levels.since(1)]
+            # what had been given to the board for too soon a time is set right as it comes
+            assert settled(seen, self.glitch) == settled(wanted, 0), out.name
 
     def check_microsteps(self) -> None:
         """Every step was made with the microsteps that its controller had commanded before it.
@@ -332,8 +322,9 @@ class Bench:
             if not found or not ledger.stages.count:
                 continue
             [setup] = found
-            assert setup.uart is not None
-            chip = self.ports[ledger.what.board].board.chips[setup.uart.name][0]
+            wire = setup.uart or setup.select
+            assert wire is not None
+            chip = self.ports[ledger.what.board].board.chips[wire.name][0]
             written = [(tick, value >> 24 & 15) for tick, register, value in chip.log if register == CHOPCONF]
             told = pulses(ledger.motions.since(0), self.cell.now)
             for (at, place), (tick, _) in zip(told, self.edges(ledger.name), strict=True):
@@ -381,6 +372,18 @@ class Bench:
         board = self.boards.home[stepper]
         self.ports[board].run_to(self.wall)
         return [(tick, place) for tick, axis, place in self.machines[board].steps if axis == stepper]
+
+
+def settled(changes: Sequence[tuple[int, bool]], apart: int) -> list[bool]:
+    """The levels that an output stayed at: of changes that are no further `apart`, the last."""
+    found: list[bool] = []
+    before: int | None = None
+    for at, level in changes:
+        if before is not None and at - before <= apart:
+            found.pop()
+        found.append(level)
+        before = at
+    return [level for level, _ in groupby(found)]
 
 
 def pulses(motions: Sequence[MotionStarted | MotionCut | MotionEnded], until: Ns) -> list[tuple[Ns, int]]:

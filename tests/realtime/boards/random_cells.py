@@ -26,9 +26,10 @@ class RandomCell:
     `driven_bench.Bench` takes them; `hands` are the other inputs. Every input rests where it is 1.
     """
 
-    def __init__(self, random: Random, *, most_boards: int = 2, chips: bool = True) -> None:
-        """`chips`: drivers may be some."""
-        self._random, self._chips = random, chips
+    def __init__(self, random: Random, *, most_boards: int = 2, chips: bool = True, rich: bool = False) -> None:
+        """`chips`: drivers may be some. `rich`: clocks of their own for each direction, chips by SPI, programs."""
+        self._random, self._chips, self._rich = random, chips, rich
+        self.files: dict[str, str] = {}  # programs, by their names in the cell file
         self.boards = "ab"[: random.choice([1, 1, 2])][:most_boards]
         self.lead = random.choice([5, 10, 30, 60])
         self.replies = random.choice(["held", "held", "held", "at once"])
@@ -119,18 +120,25 @@ class RandomCell:
     def _unit(self, unit: str, model: str, board: str, more: str = "") -> None:
         self.text += f'[units.{unit}]\nmodel = "{model}"\n{more}[hardware.{unit}]\nboard = "{board}"\n'
 
-    def _motor(self, name: str, board: str, model: str) -> None:
+    def _motor(self, name: str, board: str, model: str, *, separate: bool = False) -> None:
         self.steppers.append(name)
         self.text += f'step = "{self._any(board)}"\ndir = "{self._any(board)}"\n'
+        if separate:
+            self.text += f'minus = "{self._any(board)}"\n'
         if self._random.random() < 0.6:
             self.text += f'enable = "{self._any(board)}"\n'
-        kind = self._random.random()
-        if kind < 0.3:
+        chance = self._random.random()
+        if chance < 0.3:
             self.text += f'driver = {{ kind = "plain", half = "{self._any(board)}" }}\n'
-        elif kind < 0.5 and model != "bs0610" and self._chips:
+        elif chance < 0.5 and model != "bs0610" and self._chips:
             more = "sense = 0.05, amperes = 1.5" if model == "dcb-274" else "amperes = 0.8"
             more += ", microsteps = 2" if model in ("gs-c200s", "supersigma") else ""
-            self.text += f'driver = {{ kind = "tmc2209", uart = "{self._pin(board)}", {more} }}\n'
+            if self._rich and self._random.random() < 0.5:
+                pins = [f'{name} = "{self._pin(board)}"' for name in ("select", "clock", "mosi", "miso")]
+                kind = "tmc5160" if model == "dcb-274" else "tmc2130"
+                self.text += f'driver = {{ kind = "{kind}", {", ".join(pins)}, {more} }}\n'
+            else:
+                self.text += f'driver = {{ kind = "tmc2209", uart = "{self._pin(board)}", {more} }}\n'
 
     def _outputs(self, board: str, *names: str) -> None:
         chosen = [f'{name} = "{self._any(board)}"' for name in names if self._random.random() < 0.6]
@@ -158,12 +166,27 @@ class RandomCell:
 
     def _gsc200(self, unit: str) -> None:
         random, board = self._random, self._random.choice(self.boards)
-        self._unit(unit, "gs-c200s", board, 'straps = { CHS = "low" }\n')
-        self._motor(unit, board, "gs-c200s")
+        more, separate = 'straps = { CHS = "low" }\n', self._rich and random.random() < 0.4
+        if separate:
+            more += 'options = { clock = "separate" }\n'
+        if self._rich and random.random() < 0.5:
+            more += f'program = "{unit}.gsc"\n'
+            self.files[f"{unit}.gsc"] = self._program()
+        self._unit(unit, "gs-c200s", board, more)
+        self._motor(unit, board, "gs-c200s", separate=separate)
         self._outputs(board, "MOV", "RDY", "RAMP", "UO1")
         end = random.randrange(30, 400)
         places = {"EOT": (end, FAR), "HOME": (-FAR, random.randrange(-20, end))}
         self._inputs(unit, board, "EOT", "HOME", "ENABLE", "UI1", axis=unit, places=places)
+
+    def _program(self) -> str:
+        """A program of a GS-C200S that may go on for ever."""
+        random = self._random
+        lines = ["S20", f"T{random.randrange(50, 200)}", f"R{random.randrange(1, 60)}"]
+        for _ in range(random.randrange(2, 9)):
+            line = random.choice(["+{n}", "-{n}", "+{n}", "-{n}", "G0", "D1", "A1", "C1", "W1", "g+"])
+            lines.append(line.format(n=random.randrange(1, 300)))
+        return "\n".join([*lines, *random.choice([["G0"], []])])
 
     def _dcb274(self, unit: str) -> None:
         board, end = self._random.choice(self.boards), self._random.randrange(30, 300)

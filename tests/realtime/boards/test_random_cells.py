@@ -23,9 +23,9 @@ class Session:
 
     HAPPENS: Sequence[str] = ("unplugged", "restarted", "stopped", "recovered", "recovered")
 
-    def __init__(self, seed: int, *, rough: bool, loss: float = 0.0) -> None:
-        """`loss`: so many of the pieces on the wire are lost, doubled or damaged."""
-        self.random, self.rough, self.loss = Random(seed), rough, loss
+    def __init__(self, seed: int, *, rough: bool, loss: float = 0.0, rich: bool = False) -> None:
+        """`loss`: so many of the pieces on the wire are lost, doubled or damaged. `rich` as a `RandomCell` takes it."""
+        self.random, self.rough, self.loss, self.rich = Random(seed), rough, loss, rich
         self.cell = self.make_cell()
         self.befallen, self.stalled, self.restarted = False, False, set[str]()
         self.away, self.late = 0.0, False
@@ -35,7 +35,7 @@ class Session:
             self.bench.keep()
 
     def make_cell(self) -> RandomCell:
-        return RandomCell(self.random)
+        return RandomCell(self.random, rich=self.rich)
 
     def make_bench(self) -> Bench:
         random = self.random
@@ -46,9 +46,10 @@ class Session:
             return random.randrange(90 * MS) if self.late and random.random() < self.away else 0
 
         spoil = lossy(Random(random.random()), self.loss) if self.loss else None
+        line_timing = self.rich and random.random() < 0.5
         return Bench(
             self.cell.text, switches=self.cell.switches, jitter=lambda: random.randrange(jitter), away=away,
-            spare_exposed=True, chips=True,
+            spare_exposed=True, chips=True, read=self.cell.files.__getitem__, line_timing=line_timing,
             port={
                 "drift": random.choice([0.0, 60.0, -90.0]), "delay": random.choice([30, 100, 800]) * US, "spoil": spoil,
             },
@@ -211,3 +212,14 @@ def test_a_bad_wire_loses_nothing_in_any_cell() -> None:
 @pytest.mark.parametrize("first", range(1000, 1400, 100))
 def test_a_bad_wire_loses_nothing_in_many_cells(first: int) -> None:
     assert sum(Session(seed, rough=False, loss=0.01).run() for seed in range(first, first + 100)) > 40
+
+
+@pytest.mark.parametrize("rough", [False, True])
+def test_nothing_is_lost_with_programs_chips_by_spi_and_clocks_of_their_own(rough: bool) -> None:
+    assert sum(Session(seed, rough=rough, rich=True).run() for seed in seeds(16)) > 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rough", [False, True])
+def test_nothing_is_lost_with_programs_chips_by_spi_and_clocks_of_their_own_in_many_cells(rough: bool) -> None:
+    assert sum(Session(seed, rough=rough, rich=True).run() for seed in range(1000, 1100)) > 100
