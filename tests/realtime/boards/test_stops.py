@@ -160,6 +160,24 @@ def test_a_trigger_on_its_way_while_it_is_disarmed_is_told() -> None:
         assert made.of(Stopped)[0].shaft == 500
 
 
+@pytest.mark.parametrize("late", range(0, 6000, 250))
+def test_a_stop_says_the_level_for_which_it_was_armed_when_it_fired(late: int) -> None:
+    """The host arms it for the other level before it has heard: what was armed last has stopped nothing."""
+    made = bench(port={"delay": 1 * MS})
+    made.machine.set("gpio10", False, made.board.now)
+    made.run(10 * MS)
+    made.boards.stops["slide"].arm({"EOT": True}, made.now)
+    made.move(constant_acceleration.move(1000, 1000, 1, 400).train, 1)
+    made.run(60 * MS)
+    made.ports[0].run_to(made.wall)
+    made.machine.set("gpio10", True, made.board.now)
+    made.run(late * US + 1)
+    made.boards.stops["slide"].arm({"EOT": False}, made.now)
+    made.until(lambda: bool(made.of(Stopped)))
+    [stop] = made.of(Stopped)
+    assert (stop.input, stop.level, stop.present) == ("EOT", True, True)
+
+
 def test_a_glitch_shorter_than_two_samples_stops_nothing_and_a_longer_one_is_told_as_over() -> None:
     for length, stops in ((40, False), (400, True)):
         made = bench()

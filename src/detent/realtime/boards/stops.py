@@ -30,11 +30,11 @@ REPORT: Ns = 25 * MS  # of a trigger that is alive
 
 @dataclass
 class _Watched:
-    """An input that may stop the stepper: its endstop in the firmware."""
+    """An input that may stop the stepper: its endstop in the firmware, and the reason that it gives at either level."""
 
     setup: InputSetup
     oid: int
-    reason: int
+    reasons: tuple[int, int]
 
 
 class Stop:
@@ -50,9 +50,12 @@ class Stop:
         """
         self.stepper, self.oid = stepper.name, oid
         self._core, self._axis, self._read, self._level = core, stepper, read, level
-        self._inputs = {name: _Watched(*found, n) for n, (name, found) in enumerate(inputs.items(), 1)}
+        self._inputs: dict[str, _Watched] = {}
+        self._reasons: dict[int, tuple[_Watched, bool]] = {}  # which input has stopped it, by which level
+        for n, (name, found) in enumerate(inputs.items()):
+            self._inputs[name] = one = _Watched(*found, (2 * n + 1, 2 * n + 2))
+            self._reasons |= {one.reasons[level]: (one, level) for level in (False, True)}
         self._armed: dict[str, bool] = {}
-        self._levels: dict[str, bool] = {}  # for which each was armed last
         self._force: dict[str, int] = {}  # the tick at which what was armed last comes into force
         self._changes: list[tuple[dict[str, bool], Ns]] = []  # wanted, and not sent yet
         self.clear()
@@ -188,7 +191,6 @@ class Stop:
 
     def _on(self, watched: _Watched, level: bool, at: Ns, wall: WallNs) -> None:
         core, setup = self._core, watched.setup
-        self._levels[setup.name] = level
         sample = core.ticks(setup.sample)
         # its verdict on the level is there before the first pulse
         verdict = sample * setup.samples
@@ -200,7 +202,7 @@ class Stop:
         core.command(
             "endstop_home", oid=watched.oid, clock=clock & MASK, sample_ticks=sample, sample_count=setup.samples,
             rest_ticks=sample, pin_value=int(level is not setup.pin.active_low), trsync_oid=self.oid,
-            trigger_reason=watched.reason,
+            trigger_reason=watched.reasons[level],
         )  # fmt: skip
         if clock > wanted:
             self._axis.not_before(clock + verdict)
@@ -320,11 +322,11 @@ class Stop:
 
     def _fired(self, reason: int, wall: WallNs) -> None:
         core = self._core
-        watched = next((one for one in self._inputs.values() if one.reason == reason), None)
+        # not for what it was armed last: the host may have armed the other level before it heard of this
+        watched, level = self._reasons.get(reason, (None, True))
         self._asked = False
         self._axis.halt(dry=reason == DRY)
         name = watched.setup.name if watched is not None else ""
-        level = self._levels.get(name, True)
         self._firing = Stopped(core.setup.name, self.stepper, name, level, 0, 0, 0, level)
         if reason == DRY:
             ends = tuple(core.scale.later(self._axis.lag_at(tick)).time(tick) for tick, _ in self._before)
