@@ -78,6 +78,8 @@ def plans(draw: st.DrawFn, edges: bool) -> Plan:
     sinks = [(u, p) for u, m in units.items() for p in (EDGES[m] if edges else pins(m, (PinKind.INPUT,)))]
     taken = draw(st.lists(st.sampled_from(sinks), max_size=6, unique=True)) if sources else []
     wires = [Wire(draw(st.sampled_from(sources)), sink) for sink in taken]
+    if edges:  # units in a circle are a latch, which stays as it was switched on (TURN to RAIL, P24 to DIR)
+        wires = [wire for wire in wires if wire.source[0] < wire.sink[0]]
     programs = {unit: draw(st.sampled_from(PROGRAMS[model])) for unit, model in units.items() if model in PROGRAMS}
     return Plan(units, [wire for wire in wires if wire.source[0] != wire.sink[0]], {} if edges else programs)
 

@@ -5,6 +5,7 @@ import re
 import signal
 import tempfile
 import traceback
+from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 from typing import NamedTuple, NoReturn
@@ -74,26 +75,29 @@ def line(draw: Random, verb: str, known: list[tuple[str, bool]]) -> list[str]:
     return [verb, *words]
 
 
+# Not of this process: other tests have made threads here, and what they compute with cannot be forked.
+CLEAN = get_context("forkserver")
+CLEAN.set_forkserver_preload(["tests.cli.test_wrong_words"])
+
+
 def ended(words: list[str], folder: Path, seconds: int) -> Ended:
     """Run a command line in a process of its own, in `folder`."""
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-        child = os.fork()
-        if child == 0:
-            _be(words, folder, seconds, out.fileno(), err.fileno())
-        _, status = os.waitpid(child, 0)
-        out.seek(0)
-        err.seek(0)
+    with tempfile.NamedTemporaryFile() as out, tempfile.NamedTemporaryFile() as err:
+        child = CLEAN.Process(target=_be, args=(words, folder, seconds, out.name, err.name))
+        child.start()
+        child.join()
+        assert child.exitcode is not None
         said, errors = (data.read().decode("utf-8", "replace") for data in (out, err))
-        return Ended(os.waitstatus_to_exitcode(status), said, errors)
+        return Ended(child.exitcode, said, errors)
 
 
-def _be(words: list[str], folder: Path, seconds: int, out: int, err: int) -> NoReturn:
+def _be(words: list[str], folder: Path, seconds: int, out: str, err: str) -> NoReturn:
     code = 99
     try:
         os.chdir(folder)
         os.environ |= {"HOME": str(folder), "XDG_STATE_HOME": str(folder / "state"), "BROWSER": "true"}
-        for descriptor, here in ((os.open(os.devnull, os.O_RDONLY), 0), (out, 1), (err, 2)):
-            os.dup2(descriptor, here)
+        for here, name in enumerate((os.devnull, out, err)):
+            os.dup2(os.open(name, os.O_RDWR), here)
         import sys
 
         sys.stdin, sys.stdout, sys.stderr = open(0), open(1, "w"), open(2, "w", errors="backslashreplace")  # noqa: SIM115
