@@ -78,8 +78,11 @@ def plans(draw: st.DrawFn, edges: bool) -> Plan:
     sinks = [(u, p) for u, m in units.items() for p in (EDGES[m] if edges else pins(m, (PinKind.INPUT,)))]
     taken = draw(st.lists(st.sampled_from(sinks), max_size=6, unique=True)) if sources else []
     wires = [Wire(draw(st.sampled_from(sources)), sink) for sink in taken]
-    if edges:  # units in a circle are a latch, which stays as it was switched on (TURN to RAIL, P24 to DIR)
-        wires = [wire for wire in wires if wire.source[0] < wire.sink[0]]
+    # a circle through a part whose outputs follow its inputs is a latch: it stays as it was switched on
+    wires = [
+        wire for wire in wires
+        if wire.source[0] < wire.sink[0] or "phase-reversal" not in (units[wire.source[0]], units[wire.sink[0]])
+    ]  # fmt: skip
     programs = {unit: draw(st.sampled_from(PROGRAMS[model])) for unit, model in units.items() if model in PROGRAMS}
     return Plan(units, [wire for wire in wires if wire.source[0] != wire.sink[0]], {} if edges else programs)
 

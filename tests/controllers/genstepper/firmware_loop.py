@@ -90,20 +90,25 @@ class LoopMotor:
     def press(self, key):
         if key != self.key:
             self.key = key
-            if key:
-                self.slew(key)
-            else:
+            self.note_rest()
+            if not key:
                 self.stop()
+            elif self.state != "idle" or self.ticks > self.rested:
+                self.slew(key)  # else behind a tick of rest
+            self.note_rest()
 
     def look_at_key(self):
         """A key that is held slews again on the tick after the motor came to rest."""
+        self.note_rest()
+        if self.state == "idle" and self.key and self.ticks > self.rested and not self.closed[self.key]:
+            self.begin_slew(self.key)
+            self.note_rest()
+
+    def note_rest(self):
         if self.state != "idle":
             self.rested = None
         elif self.rested is None:
             self.rested = self.ticks
-        elif self.key and self.ticks > self.rested and not self.closed[self.key]:
-            self.begin_slew(self.key)
-            self.rested = None if self.state != "idle" else self.rested
 
     def begin_go(self):
         distance = self.target - self.position

@@ -24,12 +24,18 @@ class Session:
     HAPPENS: Sequence[str] = ("unplugged", "restarted", "stopped", "recovered", "recovered")
 
     def __init__(self, seed: int, *, rough: bool, loss: float = 0.0, rich: bool = False) -> None:
-        """`loss`: so many of the pieces on the wire are lost, doubled or damaged. `rich` as a `RandomCell` takes it."""
+        """`loss`: so many of the pieces on the wire are lost, doubled or damaged.
+
+        `rich`: as a `RandomCell` takes it, and the wire stands now and then while the computer goes on.
+        """
         self.random, self.rough, self.loss, self.rich = Random(seed), rough, loss, rich
         self.cell = self.make_cell()
         self.befallen, self.stalled, self.restarted = False, False, set[str]()
         self.away, self.late = 0.0, False
         self.bench = self.make_bench()
+        if rich and self.random.random() < 0.4:
+            for port in self.bench.ports.values():
+                port.hold = self.stand
         self.kept = self.random.random() < 0.3
         if self.kept:
             self.bench.keep()
@@ -54,6 +60,12 @@ class Session:
                 "drift": random.choice([0.0, 60.0, -90.0]), "delay": random.choice([30, 100, 800]) * US, "spoil": spoil,
             },
         )  # fmt: skip
+
+    def stand(self) -> Ns:
+        """For how long a wire stands."""
+        stands = self.late and self.random.random() < 0.004
+        self.stalled = self.stalled or stands
+        return self.random.randrange(90 * MS) if stands else 0
 
     def exposed(self) -> bool:
         """Whether a stall longer than the lead has shut a board down: no host can help that."""

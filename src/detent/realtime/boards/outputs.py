@@ -150,7 +150,7 @@ class DigitalOut:
             and not (self.of is not None and self.of.waits)
             and (self._pending[0].tick <= horizon or self._pending[0].at <= firm or self._switches_on())
         ):
-            if known is not None and known < self._pending[0].tick < soonest and not self.setup.supply:
+            if known is not None and known < self._pending[0].tick < soonest and not self._switches_on():
                 waits = True
                 break
             change, before = self._pending.popleft(), self.level
