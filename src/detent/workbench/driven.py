@@ -180,12 +180,12 @@ class DrivenEngine(Engine):
     def _real_state(self) -> RealState:
         axes = self._driven.axes()
         at_fault = [axis for axis in axes if axis.standing is Standing.FAULT]
-        why = "; ".join(dict.fromkeys(f"{'.'.join(filter(None, (a.unit, a.axis)))}: {a.why}" for a in at_fault))
+        why = list(dict.fromkeys(f"{'.'.join(filter(None, (a.unit, a.axis)))}: {a.why}" for a in at_fault))
         resting = self._driven.outputs_at_rest()
         if resting:
-            why += f"; at rest on their pins, whatever is shown: {', '.join(resting)}"
+            why.append(f"at rest on their pins, whatever is shown: {', '.join(resting)}")
         standing = Standing.FAULT if at_fault else Standing.DRIVEN
-        return RealState(standing.value, why, sum(axis.slips for axis in axes), sum(axis.stops for axis in axes))
+        return RealState(standing.value, "; ".join(why), sum(axis.slips for axis in axes), sum(axis.stops for axis in axes))
 
     def _on_wire(self) -> Callable[[str], None]:
         """A machine goes on while its host is away."""
