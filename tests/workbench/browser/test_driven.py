@@ -20,6 +20,7 @@ step = "!gpio2"
 dir = "gpio3"
 enable = "!gpio4"
 inputs = { EOT = "^gpio10", HOME = "^gpio11" }
+outputs = { UO1 = "gpio6" }
 """
 PAGES = ("/", "/program", "/terminal", "/scope", "/motion")
 STOP = "STOP"
@@ -46,12 +47,13 @@ def test_stop_stands_on_every_page_and_recover_goes_on(windows: Windows, driven:
         window.open(path)
         window.page.get_by_role("button", name=STOP, exact=True).wait_for()
     window.open("/")
+    window.call("type", "x", "A1")
     window.call("type", "x", "+30000")
     window.until("() => detent.get('u.x.x..rate') > 0")
     window.picture("driven-wide-light")
     window.page.get_by_role("button", name=STOP, exact=True).click()
     window.until("() => detent.get('real') === 'fault'")
-    window.page.get_by_text("x: emergency stop").wait_for()
+    window.page.get_by_text("x: emergency stop; at rest on their pins, whatever is shown: x.UO1").wait_for()
     window.until("() => detent.get('u.x.x..rate') === 0")
     window.picture("driven-stopped-wide-light")
     window.page.get_by_role("button", name="Recover").click()
@@ -80,6 +82,11 @@ def test_it_fits_a_phone(windows: Windows, driven: Served) -> None:
     window.page.get_by_role("button", name=STOP, exact=True).wait_for()
     assert window.page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
     window.picture("driven-phone-light")
+    window.call("type", "x", "A1")
+    window.page.get_by_role("button", name=STOP, exact=True).click()
+    window.page.get_by_text("whatever is shown: x.UO1").wait_for()
+    assert window.page.evaluate("document.documentElement.scrollWidth") <= PHONE[0]
+    window.picture("driven-stopped-phone-light")
 
 
 def test_without_real_pins_there_is_no_stop(window: Window) -> None:
