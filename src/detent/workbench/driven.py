@@ -185,7 +185,8 @@ class DrivenEngine(Engine):
         if resting:
             why.append(f"at rest on their pins, whatever is shown: {', '.join(resting)}")
         standing = Standing.FAULT if at_fault else Standing.DRIVEN
-        return RealState(standing.value, "; ".join(why), sum(axis.slips for axis in axes), sum(axis.stops for axis in axes))
+        slips, stops = sum(axis.slips for axis in axes), sum(axis.stops for axis in axes)
+        return RealState(standing.value, "; ".join(why), slips, stops)
 
     def _on_wire(self) -> Callable[[str], None]:
         """A machine goes on while its host is away."""

@@ -13,6 +13,7 @@ Whatever is late then finds the stepper stopped, and is not carried out.
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.dictionary import Message, Value
@@ -35,6 +36,17 @@ class _Watched:
     setup: InputSetup
     oid: int
     reasons: tuple[int, int]
+
+
+class _End(NamedTuple):
+    """The tick at which a trigger fires by itself, with the messages that were said when it was told so.
+
+    `at` is the cell time of that, as late as the stepper was then: what it made up to there was sent so.
+    """
+
+    tick: int
+    said: int
+    at: Ns
 
 
 class Stop:
@@ -69,8 +81,7 @@ class Stop:
         self._disarmed = 0  # the same, of the last input that was disarmed
         self._since: Ns | None = None  # cell time from which on an input may have stopped it
         self._until: int | None = None  # the tick at which it fires by itself
-        # what that was, with the messages that were said then: it fires at one of these
-        self._before: deque[tuple[int, int]] = deque()
+        self._before: deque[_End] = deque()  # what that was: it fires at one of these
         self._again = False  # that is to be put off before anything else happens
         self._quieted = 0  # messages that were said when it was told to be quiet: until then it may still have fired
         self._asked = False  # it was told to say where it stands, as steps come too late
@@ -267,8 +278,9 @@ class Stop:
         core.command("trsync_set_timeout", oid=self.oid, clock=tick & MASK)
         self._until = tick
         before, present = self._before, core.clock.tick_at(wall) + core.ticks(UNSURE)
-        before.append((tick, core.link.said))
-        while len(before) > 1 and before[1][1] <= core.link.acknowledged and before[0][0] > present:
+        at = core.scale.later(core.ticks(self._axis.lag)).time(tick)
+        before.append(_End(tick, core.link.said, at))
+        while len(before) > 1 and before[1].said <= core.link.acknowledged and before[0].tick > present:
             before.popleft()  # the next one came in time
 
     def deadline(self) -> WallNs | None:
@@ -293,7 +305,7 @@ class Stop:
         elif not self._alive or known < self._begun:
             return
         if not fires:
-            while len(self._before) > 1 and self._before[1][1] <= known:
+            while len(self._before) > 1 and self._before[1].said <= known:
                 self._before.popleft()
             # nothing is under way that could be late, or could stop it
             if (
@@ -316,7 +328,7 @@ class Stop:
         far = core.clock.tick_at(wall) + core.ticks(FAR)
         if self._until is not None and self._until < far - core.ticks(FAR // 4 * 3):
             self._put_off(far, wall)
-        elif self._until is None or known >= self._before[-1][1]:
+        elif self._until is None or known >= self._before[-1].said:
             self._quiet()
             self._quieted = core.link.said
 
@@ -329,7 +341,7 @@ class Stop:
         name = watched.setup.name if watched is not None else ""
         self._firing = Stopped(core.setup.name, self.stepper, name, level, 0, 0, 0, level)
         if reason == DRY:
-            ends = tuple(core.scale.later(self._axis.lag_at(tick)).time(tick) for tick, _ in self._before)
+            ends = tuple(end.at for end in self._before)
             self._firing = self._firing._replace(dry=ends or (0,))
         self._changes.clear()
         for other in self._armed:
