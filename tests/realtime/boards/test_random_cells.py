@@ -86,7 +86,7 @@ class Session:
                 bench.run(1200 * MS)
             case "stopped":
                 bench.driven.stop()
-                bench.run(30 * MS)
+                bench.run((130 if self.rich else 30) * MS)  # the wire may stand
                 there = [s for s in self.cell.steppers if not bench.ports[bench.boards.home[s]].unplugged]
                 stood = [bench.position(axis) for axis in there]
                 bench.run(100 * MS)
