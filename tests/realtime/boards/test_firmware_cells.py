@@ -57,7 +57,7 @@ class Side:
 
 
 class ProcessPins(Pins):
-    """What was seen at the pins of the process: `numbers` and directions of axes and pins as its setup has them."""
+    """What was seen at the pins of the process: `lines` and `clocks` are those of its setup."""
 
     def __init__(self, machine: Machine, frequency: int) -> None:
         super().__init__()

@@ -94,12 +94,14 @@ class Driven:
 
     def outputs_at_rest(self) -> list[str]:
         """Outputs of units whose board has stopped or is gone, so that they have another level than in the cell."""
-        boards, found = self.boards, list[str]()
-        for name in self.plan.outs.values():
-            stands = boards.boards[boards.home[name]].state is not State.READY
-            if stands and self.outgoing.level_of(name) is not boards.outs[name].setup.off:
-                found.append(name)
-        return found
+        boards, names = self.boards, self.plan.outs.values()
+        return [
+            out.name
+            for out in self.outgoing.outs.values()
+            if out.name in names
+            and boards.boards[boards.home[out.name]].state is not State.READY
+            and out.level is not boards.outs[out.name].setup.off
+        ]
 
     @property
     def abandoned(self) -> bool:

@@ -126,11 +126,11 @@ class Reader:
                     self._give_up()
                     continue
                 break
-            block = self._whole(at)
-            if block is None:
+            whole = self._whole(at)
+            if whole is None:
                 self._give_up()
                 continue
-            found.append(block)
+            found.append(whole)
             at += length
         del waiting[:at]
         return found

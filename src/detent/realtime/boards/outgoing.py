@@ -38,6 +38,11 @@ class Out:
         self.name, self.unit = name, unit
         self.levels: Channel[tuple[Ns, bool]] = Channel()
 
+    @property
+    def level(self) -> bool:
+        """What it is at in the cell."""
+        return self.levels.before(self.levels.count)[-1][1]
+
 
 class Outgoing:
     """`cell` and its boards: all that those share who drive the one by the other.
@@ -99,11 +104,6 @@ class Outgoing:
             if out.levels.count == 1:  # it has nothing to tell
                 self.set(out, False, self.cell.now, fresh=True)
         self.past.keep()
-
-    def level_of(self, name: str) -> bool:
-        """What an output is at in the cell."""
-        out = next(out for out in self.outs.values() if out.name == name)
-        return out.levels.before(out.levels.count)[-1][1]
 
     def commit(self) -> None:
         """Give the boards what is certain, at once."""
@@ -239,7 +239,7 @@ class Outgoing:
     def set_now(self, out: Out) -> None:
         """An output takes the level that it has in the cell, as soon as may be: nobody knows which one it had."""
         if not self._withheld(out):
-            self.boards.outs[out.name].now(out.levels.before(out.levels.count)[-1][1])
+            self.boards.outs[out.name].now(out.level)
             self.pending = True
 
     def _withheld(self, out: Out) -> bool:

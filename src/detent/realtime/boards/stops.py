@@ -66,7 +66,7 @@ class Stop:
         self._reasons: dict[int, tuple[_Watched, bool]] = {}  # which input has stopped it, by which level
         for n, (name, found) in enumerate(inputs.items()):
             self._inputs[name] = one = _Watched(*found, (2 * n + 1, 2 * n + 2))
-            self._reasons |= {one.reasons[level]: (one, level) for level in (False, True)}
+            self._reasons |= {reason: (one, bool(at)) for at, reason in enumerate(one.reasons)}
         self._armed: dict[str, bool] = {}
         self._force: dict[str, int] = {}  # the tick at which what was armed last comes into force
         self._changes: list[tuple[dict[str, bool], Ns]] = []  # wanted, and not sent yet
