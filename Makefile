@@ -12,32 +12,41 @@ SHELL := /bin/bash
 UV := $(shell command -v uv || echo .uv/bin/uv)
 PYTHON := .venv/bin/python
 STAMP := .venv/.installed
-SYSTEM_PACKAGES := sigrok-cli chromium npm
+SYSTEM_PACKAGES := sigrok-cli chromium npm zsh fish
 AXE := axe-core@4.14.1
 TSC := typescript@5.9.3
 
-# Compiled test files are kept between runs, also where the environment says that Python shall write none: 11 s a worker.
+# Compiled test files are kept between runs, also where the environment says that Python shall write none.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(PYTHON) -m pytest
 # On two processors four workers have something to do where those with a browser or a line in real time wait.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(PYTHON) -m pytest -n 4 --dist loadgroup -rs
+WORKERS := -n 4 --dist loadgroup -rs
 
-.PHONY: setup system axe tsc run test test-all check bench fuzz chaos soak pythons lock docs clean
+.PHONY: setup system axe tsc run test test-all check types collected bench fuzz chaos soak pythons lock docs clean
 
 setup: $(STAMP)
 
 run: $(STAMP)
 	@.venv/bin/detent demo
 
-test: check system axe tsc
-	$(PYTEST)
+test: system axe tsc pythons
+	@$(MAKE) --no-print-directory -j 2 check collected
+	$(PYTEST) $(WORKERS)
 
-test-all: check system axe tsc
-	$(PYTEST) -m "slow or not slow"
+test-all: system axe tsc pythons
+	@$(MAKE) --no-print-directory -j 2 check collected
+	$(PYTEST) $(WORKERS) -m "slow or not slow"
 
-check: $(STAMP)
+check: types $(STAMP)
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/lint-imports
+
+types: $(STAMP)
 	.venv/bin/mypy
+
+# Beside the checks the test files are compiled once; each worker would compile all of them for itself.
+collected: $(STAMP)
+	@$(PYTEST) --collect-only -qq > /dev/null
 
 bench: $(STAMP)
 	$(PYTHON) -m bench
@@ -53,7 +62,7 @@ pythons: $(STAMP)
 	    $(UV) python find --quiet $$version > /dev/null 2>&1 || { echo "no Python $$version here"; continue; }; \
 	    $(UV) venv --quiet --allow-existing --python $$version .venv/python$$version \
 	        && $(UV) pip install --quiet --python .venv/python$$version --constraint requirements.lock pydantic numpy \
-	        && echo "Python $$version is ready"; \
+	        && echo "Python $$version is ready" || echo "could not make Python $$version ready: its tests are skipped"; \
 	done
 
 # What the reference pages take from the tables, and the pages as a site.
