@@ -29,7 +29,8 @@ TABLES: Mapping[str, type[Any]] = {
 
 WORDS: Mapping[Any, str] = {
     kinds.LevelField: "a level", kinds.DurationField: "a time", kinds.Names: "text, or a list",
-    hardware.InPin: "a pin of a board", hardware.OutPin: "a pin of a board", hardware.ErrorField: "`exact`, or a time",
+    hardware.InputPin: "a pin of a board", hardware.OutputPin: "a pin of a board",
+    hardware.ErrorField: "`exact`, or a time",
     str: "text", bool: "true, false", int: "a whole number", float: "a number",
 }  # fmt: skip
 BOUNDS: Mapping[str, str] = {"gt": "above {}", "ge": "at least {}", "lt": "below {}", "le": "at most {}"}

@@ -49,8 +49,8 @@ def _error(value: object) -> Ns | Literal["exact"]:
     return error
 
 
-InPin = Annotated[str, AfterValidator(_signed)]
-OutPin = Annotated[str, AfterValidator(_plain)]
+InputPin = Annotated[str, AfterValidator(_signed)]
+OutputPin = Annotated[str, AfterValidator(_plain)]
 ErrorField = Annotated[Ns | Literal["exact"], BeforeValidator(_error)]
 
 
@@ -97,7 +97,7 @@ class Driver(_Table):
 
     kind: Literal["plain", "tmc2208", "tmc2209", "tmc2130", "tmc5160"]
     """A chip whose registers are set, or a plain driver with an input that halves its current."""
-    half: OutPin | None = None
+    half: OutputPin | None = None
     """Plain: high while half of the current will do."""
     amperes: Annotated[Number, Field(gt=0)] | None = None
     """A: of a phase, for full power; the most that the chip is told, where the controller commands amperes."""
@@ -105,21 +105,21 @@ class Driver(_Table):
     """Ohm: the sense resistors."""
     microsteps: Annotated[Literal[1, 2, 4, 8, 16, 32, 64], NoFlag] | None = None
     """Pulses a full step, under a controller that commands none."""
-    uart: InPin | None = None
+    uart: InputPin | None = None
     """tmc2208, tmc2209: the pin of the UART."""
-    transmit: OutPin | None = None
+    transmit: OutputPin | None = None
     """The pin that sends, where it is not that of `uart`."""
     address: Annotated[int, NoFlag, Field(ge=0, le=3)] = 0
     """tmc2209: of several on one UART."""
-    select: OutPin | None = None
+    select: OutputPin | None = None
     """tmc2130, tmc5160: the pin that selects the chip; `bus` goes with it, or `clock`, `mosi` and `miso`."""
     bus: str | None = None
     """A name of the board's own SPI."""
-    clock: OutPin | None = None
+    clock: OutputPin | None = None
     """SPI by three pins."""
-    mosi: OutPin | None = None
+    mosi: OutputPin | None = None
     """SPI by three pins."""
-    miso: InPin | None = None
+    miso: InputPin | None = None
     """SPI by three pins."""
     quiet: Flag = False
     """StealthChop instead of SpreadCycle."""
@@ -161,19 +161,19 @@ class Hardware(_Table):
 
     board: str
     """The board they are on."""
-    step: OutPin | None = None
+    step: OutputPin | None = None
     """Step clock; left out in a table that a unit with several axes shares."""
-    dir: OutPin | None = None
+    dir: OutputPin | None = None
     """Direction, high for plus."""
-    minus: OutPin | None = None
+    minus: OutputPin | None = None
     """The clock of the minus direction, of a driver with two; `dir` then is a pin with nothing on it."""
-    enable: OutPin | None = None
+    enable: OutputPin | None = None
     """Of the driver: on while the unit is."""
     pulse: DurationField | None = None
     """How long a step pulse is at least, and the direction holds behind it; left out: the controller's."""
-    outputs: dict[str, OutPin] = {}
+    outputs: dict[str, OutputPin] = {}
     """Outputs of the controller, by its names."""
-    inputs: dict[str, InPin] = {}
+    inputs: dict[str, InputPin] = {}
     """Inputs of the controller; one that is wired here takes no wire, no script, and no switch but of the machine."""
     unwired: Names = []
     """Limit and home switches that this machine does not have."""

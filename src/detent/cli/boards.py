@@ -226,7 +226,7 @@ def _print_boards(check: "Check", described: "Description") -> None:
         for axis in setup.steppers:
             way = f"direction {axis.dir}" if axis.minus is None else f"minus {axis.minus}"
             print(f"  axis   {axis.name:<16} steps {axis.step}, {way}, pulses of {show_duration(axis.pulse)}")
-        for out in setup.outs:
+        for out in setup.outputs:
             print(f"  output {out.name:<16} {out.pin}, at rest {int(out.off)}")
         for chip in setup.drivers:
             where = f"select {chip.select}" if chip.uart is None else f"uart {chip.uart}, address {chip.address}"

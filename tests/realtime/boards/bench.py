@@ -11,7 +11,7 @@ from detent.realtime.boards.events import Event, Ready, Stopped
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import Machine, MachineAxis, MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
-from detent.realtime.boards.setup import BoardSetup, InputSetup, OutSetup, Pin, StepperSetup
+from detent.realtime.boards.setup import BoardSetup, InputSetup, OutputSetup, Pin, StepperSetup
 from detent.ticks import MS, SECOND, Ns, to_fixed
 
 E = TypeVar("E")
@@ -19,13 +19,13 @@ E = TypeVar("E")
 SLIDE = StepperSetup("slide", Pin("gpio2"), Pin("gpio3"))
 EOT = InputSetup("EOT", Pin.parse("^gpio10"))
 HOME = InputSetup("HOME", Pin.parse("!gpio11"))
-MOV = OutSetup("MOV", Pin("gpio6"))
-ENABLE = OutSetup("ENABLE", Pin.parse("!gpio4"), watchdog=2 * SECOND)
+MOV = OutputSetup("MOV", Pin("gpio6"))
+ENABLE = OutputSetup("ENABLE", Pin.parse("!gpio4"), watchdog=2 * SECOND)
 
 
 def setup(name: str = "left", **changes: Any) -> BoardSetup:
     """A board with an axis, two inputs and two outputs."""
-    parts: dict[str, Any] = {"steppers": (SLIDE,), "outs": (MOV, ENABLE), "inputs": (EOT, HOME)}
+    parts: dict[str, Any] = {"steppers": (SLIDE,), "outputs": (MOV, ENABLE), "inputs": (EOT, HOME)}
     return BoardSetup(name, **{**parts, **changes})
 
 

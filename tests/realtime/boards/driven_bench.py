@@ -289,10 +289,10 @@ class Bench:
 
     def check_outputs(self) -> None:
         """Behind a rest every output of a driven unit is on its pin as the cell has it."""
-        for out in self.driven.outgoing.outs.values():
-            board = next(name for name, board in self.boards.boards.items() if out.name in board.outs)
+        for out in self.driven.outgoing.outputs.values():
+            board = next(name for name, board in self.boards.boards.items() if out.name in board.outputs)
             self.ports[board].run_to(self.wall)
-            pin = self.boards.outs[out.name].setup.pin
+            pin = self.boards.outputs[out.name].setup.pin
             found = self.machines[board].outputs[pin.name] is not pin.active_low
             [*_, (at, level)] = out.levels.before(out.levels.count)
             assert found is level, f"{out.name} is {found}, and {level} in the cell since {at / 1e9:.4f} s"
@@ -302,11 +302,11 @@ class Bench:
 
         Where no stop took anything back, and none is said to have been late. The bench has kept all (`keep`).
         """
-        for out in self.driven.outgoing.outs.values():
+        for out in self.driven.outgoing.outputs.values():
             if any(news.text.startswith(f"{out.name} changed ") for news in self.news):
                 continue
-            board = next(name for name, board in self.boards.boards.items() if out.name in board.outs)
-            setup, edges = self.boards.outs[out.name].setup, self.machines[board].edges
+            board = next(name for name, board in self.boards.boards.items() if out.name in board.outputs)
+            setup, edges = self.boards.outputs[out.name].setup, self.machines[board].edges
             seen = [(tick, level is not setup.pin.active_low) for tick, pin, level in edges if pin == setup.pin.name]
             wanted = [(-1, setup.initial), *out.levels.since(1)]
             # what had been given to the board for too soon a time is set right as it comes
@@ -347,11 +347,11 @@ class Bench:
         for ledger in self.driven.ledgers:
             if ledger.what.half and (stage := ledger.stage_at(NEVER)) is not None:
                 holds, full = stage.settling > 0, max(stage.run, stage.hold) if stage.chops else 1.0
-                assert self.boards.outs[ledger.what.half].level is ((stage.hold if holds else stage.run) <= full / 2)
+                assert self.boards.outputs[ledger.what.half].level is ((stage.hold if holds else stage.run) <= full / 2)
             for name, active in ((ledger.what.enable, True), (ledger.what.half, False)):
                 if not name or (name == ledger.what.half and (late or ledger.stages.count)):
                     continue
-                machine, pin = self.machines[ledger.what.board], self.boards.outs[name].setup.pin
+                machine, pin = self.machines[ledger.what.board], self.boards.outputs[name].setup.pin
                 changes = [
                     (tick, level is not pin.active_low) for tick, where, level in machine.edges if where == pin.name
                 ]

@@ -82,7 +82,7 @@ def test_behind_a_slip_outputs_and_steps_keep_their_order_and_distance(pause: in
         bench.rest()
         assert bench.driven.axes()[0].slips == 1
         [ledger] = bench.driven.ledgers
-        [changed] = [at for at, level in bench.driven.outgoing.outs[0, "UO1"].levels.since(0) if level]
+        [changed] = [at for at, level in bench.driven.outgoing.outputs[0, "UO1"].levels.since(0) if level]
         begun = pulses(ledger.motions.since(0), bench.cell.now)[150][0]
         [(released, _)] = [pair for pair in levels(bench, "gpio8") if pair[1]][-1:]
         scale = bench.boards.boards["b"].core.scale
@@ -109,7 +109,7 @@ def test_an_output_that_is_late_behind_steps_in_time_is_told(begins: int) -> Non
         bench.run(begins * MS)
         bench.stall(18 * MS)
         bench.rest()
-        out = bench.driven.outgoing.outs[0, "RAMP"]
+        out = bench.driven.outgoing.outputs[0, "RAMP"]
         scale = bench.boards.boards["b"].core.scale
         found = [(scale.time(tick), level) for tick, pin, level in bench.machines["b"].edges if pin == "gpio9"]
         late = [came - at for (came, _), (at, _) in zip(found[1:], out.levels.since(2), strict=True)]

@@ -18,7 +18,15 @@ from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.fake.machine import MachineSwitch
 from detent.realtime.boards.fake.port import FakePort
 from detent.realtime.boards.ports import Look
-from detent.realtime.boards.setup import BoardSetup, DriverSetup, InputSetup, OutSetup, Pin, SetupProblem, StepperSetup
+from detent.realtime.boards.setup import (
+    BoardSetup,
+    DriverSetup,
+    InputSetup,
+    OutputSetup,
+    Pin,
+    SetupProblem,
+    StepperSetup,
+)
 from detent.ticks import MS, SECOND, US
 
 ENDLESS = constant_acceleration.move(1000, 1000, 1, None).train
@@ -26,7 +34,7 @@ ENDLESS = constant_acceleration.move(1000, 1000, 1, None).train
 
 def moving(**changes: Any) -> Bench:
     made = bench(**changes)
-    made.boards.outs["ENABLE"].set(True, made.now)
+    made.boards.outputs["ENABLE"].set(True, made.now)
     made.move(ENDLESS, 1)
     made.run(300 * MS)
     return made
@@ -268,7 +276,7 @@ def test_a_board_with_another_configuration_is_started_again() -> None:
     for reset in ("reset", "config_reset"):
         fake = FakeBoard(slide(), reset=reset)
         first = Bench([(setup(), FakePort(fake))])
-        second = Bench([(setup(outs=(MOV,)), FakePort(fake))])
+        second = Bench([(setup(outputs=(MOV,)), FakePort(fake))])
         assert second.of(Ready)[0].restarted
         assert fake.resets == 1
         second.move(constant_acceleration.move(200, 1500, 60, 50).train, 1)
@@ -289,10 +297,10 @@ def refusal(made: BoardSetup, fake: FakeBoard | None = None, port: dict[str, Any
     ("changes", "fake", "where", "said"),
     [
         ({"inputs": (InputSetup("EOT", Pin("gpoi10")), )}, {}, ("EOT", "pin"), "no pin gpoi10; it has gpio10"),
-        ({"outs": (OutSetup("MOV", Pin("gpio1")),)}, {}, ("MOV", "pin"), "needs gpio1 itself, for serial"),
+        ({"outputs": (OutputSetup("MOV", Pin("gpio1")),)}, {}, ("MOV", "pin"), "needs gpio1 itself, for serial"),
         ({}, {"leave_out": ("config_trsync", "buttons_query")}, ("", ""), "has no config_trsync, buttons_query; flash"),
-        ({"outs": (OutSetup("E", Pin("gpio4"), watchdog=60 * SECOND),)}, {"frequency": 72_000_000}, ("E", "watchdog"),
-         "take 14 s or less"),
+        ({"outputs": (OutputSetup("E", Pin("gpio4"), watchdog=60 * SECOND),)}, {"frequency": 72_000_000},
+         ("E", "watchdog"), "take 14 s or less"),
         ({"drivers": (DriverSetup("d", "tmc5160", 0.1, select=Pin("gpio20"), bus="spi9"),)}, {}, ("d", "bus"),
          "no spi bus spi9; it has spi"),
     ],
@@ -313,10 +321,10 @@ def test_something_that_is_no_board_is_refused() -> None:
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: setup(outs=(OutSetup("MOV", Pin("gpio2")),)), "MOV.pin: the pin gpio2 is taken by slide.step"),
+        (lambda: setup(outputs=(OutputSetup("MOV", Pin("gpio2")),)), "MOV.pin: the pin gpio2 is taken by slide.step"),
         (lambda: setup(inputs=(EOT, InputSetup("EOT", Pin("gpio30")))), "two things of that name"),
         (lambda: setup(lead=10 * MS), "left.lead: a lead of 10 ms is too short for a margin of 4 ms"),
-        (lambda: setup(outs=(OutSetup("E", Pin("gpio4"), watchdog=50 * MS),)), "E.watchdog: 50 ms is less than"),
+        (lambda: setup(outputs=(OutputSetup("E", Pin("gpio4"), watchdog=50 * MS),)), "E.watchdog: 50 ms is less than"),
         (lambda: setup(inputs=(InputSetup("EOT", Pin("gpio10"), samples=0),)), "EOT.sample: an input is sampled"),
         (lambda: setup(steppers=(StepperSetup("s", Pin("gpio2"), Pin("gpio3"), stops=("LX",)),)), "LX is no input"),
     ],
@@ -340,7 +348,7 @@ def test_pins_as_users_write_them() -> None:
 
 def test_a_host_that_slept_does_not_take_its_board_for_lost() -> None:
     """Nobody has asked it anything meanwhile."""
-    made = bench(outs=(MOV,))
+    made = bench(outputs=(MOV,))
     made.run(1 * SECOND)
     made.turn(made.wall + 4 * SECOND)
     made.run(100 * MS)
@@ -381,7 +389,7 @@ def test_a_bad_wire_costs_no_step(seed: int) -> None:
         made.rest()
         assert made.machine.axes["slide"].position == made.axes["slide"].shaft
     made.boards.stops["slide"].arm({"EOT": False}, made.now)
-    made.boards.outs["MOV"].set(True, made.now)
+    made.boards.outputs["MOV"].set(True, made.now)
     made.move(ENDLESS, 1)
     made.until(lambda: bool(made.of(Stopped)))
     assert made.of(Stopped)[0].shaft == made.machine.axes["slide"].position == 300
@@ -424,7 +432,7 @@ def test_boards_that_do_not_go_together() -> None:
 
 def test_an_output_with_a_watchdog_is_fed_at_rest() -> None:
     made = bench()
-    made.boards.outs["ENABLE"].set(True, made.now)
+    made.boards.outputs["ENABLE"].set(True, made.now)
     made.run(20 * SECOND)
     assert made.machine.outputs["gpio4"] is False
     assert made.boards.ready

@@ -23,7 +23,7 @@ from detent.realtime.boards.events import (
     Stopped,
 )
 from detent.realtime.boards.ports import Look, open_port
-from detent.realtime.boards.setup import BoardSetup, InputSetup, OutSetup, Pin, StepperSetup
+from detent.realtime.boards.setup import BoardSetup, InputSetup, OutputSetup, Pin, StepperSetup
 from detent.ticks import MS, SECOND, US, Ns, to_fixed
 
 pytestmark = with_firmware
@@ -156,7 +156,10 @@ def setup(watchdog: Ns = 2 * SECOND, pulse: Ns = 5 * US) -> BoardSetup:
     return BoardSetup(
         "left",
         steppers=(StepperSetup("slide", Pin(f"gpio{STEP}"), Pin(f"gpio{DIR}"), pulse),),
-        outs=(OutSetup("MOV", Pin(f"gpio{MOV}")), OutSetup("ENABLE", Pin(f"gpio{ENABLE}", True), watchdog=watchdog)),
+        outputs=(
+            OutputSetup("MOV", Pin(f"gpio{MOV}")),
+            OutputSetup("ENABLE", Pin(f"gpio{ENABLE}", True), watchdog=watchdog),
+        ),
         inputs=(InputSetup("EOT", Pin(f"gpio{EOT}", pull=1)), InputSetup("HOME", Pin(f"gpio{HOME}"))),
     )
 
@@ -291,10 +294,10 @@ def test_homings_stop_on_the_step(host: Host) -> None:
 @with_machine
 def test_outputs_change_with_the_steps_and_inputs_are_told(host: Host) -> None:
     machine = host.machine
-    host.boards.outs["MOV"].set(True, host.now)
+    host.boards.outputs["MOV"].set(True, host.now)
     host.run(0.1)
     assert machine.output(MOV)
-    host.boards.outs["MOV"].set(False, host.now)
+    host.boards.outputs["MOV"].set(False, host.now)
     host.run(0.1)
     assert not machine.output(MOV)
     machine.put(HOME, False)
@@ -305,7 +308,7 @@ def test_outputs_change_with_the_steps_and_inputs_are_told(host: Host) -> None:
 
 
 def test_an_emergency_stop_in_a_move_and_on_from_there(host: Host) -> None:
-    host.boards.outs["ENABLE"].set(True, host.now)
+    host.boards.outputs["ENABLE"].set(True, host.now)
     host.move(constant_acceleration.move(1000, 1000, 1, None).train, 1)
     host.run(0.3)
     host.boards.emergency_stop(host.machine.wall())
@@ -346,7 +349,7 @@ def test_a_host_that_is_gone_leaves_its_position(host: Host, begin: Begin) -> No
 
 
 def test_an_output_that_nobody_refreshes_falls(host: Host, begin: Begin) -> None:
-    host.boards.outs["ENABLE"].set(True, host.now)
+    host.boards.outputs["ENABLE"].set(True, host.now)
     host.run(0.2)
     if MACHINE:
         assert not host.machine.output(ENABLE)

@@ -121,7 +121,7 @@ class ProcessBench(Bench):
             step, turn = int(stepper.step.name[4:]), int(stepper.dir.name[4:])
             self.process.axis(n, step, turn, inverted=stepper.step.active_low)
             pins.clocks[step] = stepper.name, stepper.dir.active_low, int(not stepper.step.active_low)
-        pins.lines = {int(out.pin.name[4:]): out.pin.name for out in setup.outs}
+        pins.lines = {int(out.pin.name[4:]): out.pin.name for out in setup.outputs}
         inputs = {put.name: put.pin for put in setup.inputs}
         for number, (name, (axis, low, high)) in enumerate(switches.items()):
             n, stepper = self.axes[axis]

@@ -9,7 +9,7 @@ from tests.realtime.boards.bench import MOV, SLIDE, Bench, bench
 
 from detent.ramps import constant_acceleration
 from detent.realtime.boards.events import ShutDown, Slipped
-from detent.realtime.boards.setup import OutSetup, Pin
+from detent.realtime.boards.setup import OutputSetup, Pin
 from detent.ticks import MS, SECOND, Ns
 
 
@@ -25,9 +25,9 @@ def test_a_change_comes_a_lead_behind_its_time_with_the_step_of_that_time() -> N
     made.move(constant_acceleration.move(200, 1000, 50, 300).train, 1)
     train = made.axes["slide"].train
     assert train is not None
-    made.boards.outs["MOV"].set(True, made.now)
+    made.boards.outputs["MOV"].set(True, made.now)
     made.until(lambda: not made.axes["slide"].moving)
-    made.boards.outs["MOV"].set(False, train.time_of(300))
+    made.boards.outputs["MOV"].set(False, train.time_of(300))
     made.rest()
     assert changes(made) == [(0, True), (round(train.time_of(300) / 1000), False)]
     last_step, last_edge = made.machine.steps[-1][0], made.machine.edges[-1][0]
@@ -37,7 +37,7 @@ def test_a_change_comes_a_lead_behind_its_time_with_the_step_of_that_time() -> N
 def test_changes_of_one_instant_come_in_order() -> None:
     made = bench()
     for level in (True, False, True):
-        made.boards.outs["MOV"].set(level, 5 * MS)
+        made.boards.outputs["MOV"].set(level, 5 * MS)
     made.run(100 * MS)
     ticks = [tick for tick, pin, _ in made.machine.edges if pin == "gpio6"][-3:]
     assert ticks[1] - ticks[0] == ticks[2] - ticks[1] == 1
@@ -45,7 +45,7 @@ def test_changes_of_one_instant_come_in_order() -> None:
 
 def test_what_was_not_given_to_the_board_is_taken_back_without_a_trace() -> None:
     made = bench()
-    out = made.boards.outs["MOV"]
+    out = made.boards.outputs["MOV"]
     at = made.now
     made.boards.stops["slide"].arm({"EOT": False}, at)
     out.set(True, at + 1)
@@ -58,7 +58,7 @@ def test_what_was_not_given_to_the_board_is_taken_back_without_a_trace() -> None
 
 def test_what_has_left_is_corrected() -> None:
     made = bench()
-    out = made.boards.outs["MOV"]
+    out = made.boards.outputs["MOV"]
     out.set(True, made.now + 1)
     at = made.now
     made.run(27 * MS)
@@ -71,7 +71,7 @@ def test_what_has_left_is_corrected() -> None:
 def test_what_nothing_can_take_back_is_given_at_once() -> None:
     """So that a host which is kept away for less than the lead is not late with it: also what a stop begins with."""
     made = bench()
-    out = made.boards.outs["MOV"]
+    out = made.boards.outputs["MOV"]
     out.set(True, made.now)
     made.boards.stops["slide"].arm({"EOT": False}, made.now)
     made.run(3 * MS)
@@ -87,7 +87,7 @@ def test_what_nothing_can_take_back_is_given_at_once() -> None:
 def test_a_watchdog_is_fed_without_a_time() -> None:
     """So that a host which is kept away before it writes is not late with it."""
     made = bench()
-    made.boards.outs["ENABLE"].set(True, made.now)
+    made.boards.outputs["ENABLE"].set(True, made.now)
     made.run(100 * MS)
     before = len(made.board.log)
     made.run(3 * SECOND)
@@ -99,7 +99,7 @@ def test_a_watchdog_is_fed_without_a_time() -> None:
 
 def test_what_has_left_and_is_set_again_alike_stays() -> None:
     made = bench()
-    out = made.boards.outs["MOV"]
+    out = made.boards.outputs["MOV"]
     at = made.now + 1
     out.set(True, at)
     made.run(27 * MS)
@@ -112,7 +112,7 @@ def test_what_has_left_and_is_set_again_alike_stays() -> None:
 
 def test_what_is_set_otherwise_behind_a_rewind_ends_as_it_was_set() -> None:
     made = bench()
-    out = made.boards.outs["MOV"]
+    out = made.boards.outputs["MOV"]
     at = made.now
     out.set(True, at + 1)
     out.set(False, at + 2 * MS)
@@ -128,7 +128,7 @@ def test_a_late_change_is_made_at_once() -> None:
     made = bench()
     at = made.now
     made.run(80 * MS)
-    made.boards.outs["MOV"].set(True, at)
+    made.boards.outputs["MOV"].set(True, at)
     made.run(50 * MS)
     assert made.machine.outputs["gpio6"] is True
     assert made.boards.ready
@@ -137,11 +137,11 @@ def test_a_late_change_is_made_at_once() -> None:
 @pytest.mark.parametrize("kept_away", [40, 100])
 def test_a_pulse_keeps_its_width_where_the_computer_was_away(kept_away: int) -> None:
     """At rest: what follows comes later, too; before, both edges came at once."""
-    made = bench(steppers=(replace(SLIDE, unit="x"),), outs=(replace(MOV, unit="x"),))
+    made = bench(steppers=(replace(SLIDE, unit="x"),), outputs=(replace(MOV, unit="x"),))
     at = made.now
     made.turn(made.wall + kept_away * MS)
     for n in range(3):
-        made.boards.outs["MOV"].set(n % 2 == 0, at + MS + 4 * n * MS)
+        made.boards.outputs["MOV"].set(n % 2 == 0, at + MS + 4 * n * MS)
     made.run(200 * MS)
     (first, _), *_ = found = changes(made)
     assert [(time - first, level) for time, level in found] == [(0, True), (4000, False), (8000, True)]
@@ -152,7 +152,7 @@ def test_a_pulse_keeps_its_width_where_the_computer_was_away(kept_away: int) -> 
 
 def test_now() -> None:
     made = bench()
-    out = made.boards.outs["MOV"]
+    out = made.boards.outputs["MOV"]
     out.set(True, made.now + 500 * MS)
     out.now(True)
     made.run(20 * MS)
@@ -163,8 +163,8 @@ def test_now() -> None:
 
 
 def test_active_low_outputs_begin_and_fall_as_they_are_set_up() -> None:
-    low = OutSetup("RDY", Pin.parse("!gpio7"), initial=True, off=False)
-    made = bench(outs=(low,))
+    low = OutputSetup("RDY", Pin.parse("!gpio7"), initial=True, off=False)
+    made = bench(outputs=(low,))
     assert made.machine.outputs["gpio7"] is False
     made.boards.emergency_stop(made.wall)
     made.run(20 * MS)
@@ -173,7 +173,7 @@ def test_active_low_outputs_begin_and_fall_as_they_are_set_up() -> None:
 
 def test_many_changes_wait_for_room_in_the_queue() -> None:
     made = bench(board={"moves": 8})
-    out = made.boards.outs["MOV"]
+    out = made.boards.outputs["MOV"]
     for n in range(60):
         out.set(n % 2 == 0, made.now + n * MS // 10)
     made.run(1 * SECOND)
@@ -185,7 +185,7 @@ def test_many_changes_wait_for_room_in_the_queue() -> None:
 def test_what_is_late_already_cannot_be_too_late(held: Ns) -> None:
     """A time a few milliseconds from now, on a wire that takes longer, would shut the board down."""
     made = bench()
-    out, at = made.boards.outs["MOV"], made.now
+    out, at = made.boards.outputs["MOV"], made.now
     made.run(80 * MS)
     port = made.ports[0]
     send = port.send
@@ -205,7 +205,7 @@ def stood(seed: int) -> None:
     """An output that changes, late or in time, on a board whose clock stands now and then (a process kept waiting)."""
     random = Random(seed)
     made = bench()
-    out, level = made.boards.outs["MOV"], False
+    out, level = made.boards.outputs["MOV"], False
     for _ in range(30):
         level = not level
         out.set(level, made.now - random.choice([0, 0, random.randrange(100 * MS)]))

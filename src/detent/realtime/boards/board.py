@@ -60,7 +60,7 @@ class Board:
         self.wants_reopening = False  # it was told to start again: its port goes away
         self.core = core = Core(setup)
         self._equipment = has = Equipment(core)
-        self.steppers, self.stops, self.outs, self.drivers = has.steppers, has.stops, has.outs, has.drivers
+        self.steppers, self.stops, self.outputs, self.drivers = has.steppers, has.stops, has.outputs, has.drivers
         self._probes = Probes(core)
         core.look_at_clock = self._probes.ask
         self._handlers = {
@@ -117,7 +117,7 @@ class Board:
             "blocks": link.blocks, "bytes": link.bytes_sent, "retransmitted": link.retransmitted,
             "refused": link.refused, "damaged": link.damaged,
             "slips": sum(axis.slips for axis in self.steppers.values()),
-            "corrections": sum(out.corrections for out in self.outs.values()),
+            "corrections": sum(out.corrections for out in self.outputs.values()),
         }  # fmt: skip
 
     # -- bytes and time
@@ -380,7 +380,7 @@ class Board:
         self._equipment.begin(raw, wall)
         self.state = State.READY
         self.reason = ""
-        for out in self.outs.values():
+        for out in self.outputs.values():
             self._begin_out(out, wall)
         if self._recovering and self._known:
             lost = self._fresh

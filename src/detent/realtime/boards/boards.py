@@ -34,7 +34,7 @@ class Boards:
 
     The owner watches `reading()` and `writing()`, calls `receive`, `flush`, and `due` at `deadline()`, runs its cell to
     the present, tells steppers and outputs what it did, and calls `commit` (at `commit_at()` too); then it looks at
-    `events()`. `steppers`, `outs`, `stops` and `drivers` are those of all boards, by name.
+    `events()`. `steppers`, `outputs`, `stops` and `drivers` are those of all boards, by name.
     """
 
     def __init__(self, boards: Sequence[tuple[BoardSetup, Port]]) -> None:
@@ -44,7 +44,7 @@ class Boards:
         self._pairs = [(Board(setup), port) for setup, port in boards]
         self.boards: dict[str, Board] = {}
         self.steppers: dict[str, Stepper] = {}
-        self.outs: dict[str, DigitalOut] = {}
+        self.outputs: dict[str, DigitalOut] = {}
         self.stops: dict[str, Stop] = {}
         self.drivers: dict[str, Driver] = {}
         self.home: dict[str, str] = {}
@@ -62,14 +62,14 @@ class Boards:
                 self.home[item.name] = board.name
             self.boards[board.name] = board
             self.steppers |= board.steppers
-            self.outs |= board.outs
+            self.outputs |= board.outputs
             self.stops |= board.stops
             self.drivers |= board.drivers
         lags: dict[str, Lag] = {}
         for stepper in self.steppers.values():
             if stepper.setup.unit:
                 stepper.shares(lags.setdefault(stepper.setup.unit, stepper.of))
-        for out in self.outs.values():
+        for out in self.outputs.values():
             if out.setup.unit in lags:
                 out.shares(lags[out.setup.unit])
         self.master = self._pairs[0][0]
@@ -201,11 +201,11 @@ class Boards:
             return None
         soonest = self._committed + self.batch
         times: list[WallNs] = []
-        outs: list[WallNs] = []  # these have their times, and wait for no batch
+        changes: list[WallNs] = []  # of outputs; these have their times, and wait for no batch
         for board, _ in self._pairs:
             if board.state is not State.READY:
                 continue
-            outs += [at for out in board.outs.values() if (at := out.pending_at()) is not None]
+            changes += [at for out in board.outputs.values() if (at := out.pending_at()) is not None]
             for stepper in board.steppers.values():
                 pulse = None if times and times[-1] <= soonest else stepper.next_pulse()
                 if pulse is not None:
@@ -215,8 +215,8 @@ class Boards:
             ):
                 times.append(0)
         found = [max(min(times), soonest)] if times else []
-        if outs:
-            found.append(max(min(outs), self._committed + AT_ONCE))
+        if changes:
+            found.append(max(min(changes), self._committed + AT_ONCE))
         return min(found, default=None)
 
     @property

@@ -159,9 +159,9 @@ class Check:
 
     def _enable(self, axis: DrivenAxis, on: bool) -> None:
         if axis.enable:
-            self._boards.outs[axis.enable].now(on)
+            self._boards.outputs[axis.enable].now(on)
         if axis.half and on:
-            self._boards.outs[axis.half].now(False)
+            self._boards.outputs[axis.half].now(False)
         now = self._real.wall()
         self._boards.commit(self._boards.cell_at(now), now, self._real.wall)
         self._pass(WAKING if on and axis.enable else 50 * MS)
@@ -228,7 +228,7 @@ class Check:
     def end(self) -> None:
         """Drivers are let go."""
         for axis in self.plan.axes:
-            if axis.enable and not self._boards.outs[axis.enable].dead:
-                self._boards.outs[axis.enable].now(False)
+            if axis.enable and not self._boards.outputs[axis.enable].dead:
+                self._boards.outputs[axis.enable].now(False)
         now = self._real.wall()
         self._boards.commit(self._boards.cell_at(now), now, self._real.wall)

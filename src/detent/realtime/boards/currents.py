@@ -95,5 +95,5 @@ class Currents:
         if self._halved.get(ledger.name) is half:
             return False
         self._halved[ledger.name] = half
-        self._boards.outs[ledger.what.half].now(half)
+        self._boards.outputs[ledger.what.half].now(half)
         return True

@@ -94,13 +94,13 @@ class Driven:
 
     def outputs_at_rest(self) -> list[str]:
         """Outputs of units whose board has stopped or is gone, so that they have another level than in the cell."""
-        boards, names = self.boards, self.plan.outs.values()
+        boards, names = self.boards, self.plan.outputs.values()
         return [
             out.name
-            for out in self.outgoing.outs.values()
+            for out in self.outgoing.outputs.values()
             if out.name in names
             and boards.boards[boards.home[out.name]].state is not State.READY
-            and out.level is not boards.outs[out.name].setup.off
+            and out.level is not boards.outputs[out.name].setup.off
         ]
 
     @property
@@ -264,7 +264,7 @@ class Driven:
         counts = iter(oldest.counts)
         for ledger in self.ledgers:
             ledger.motions.forget(next(counts))
-        for out in self.outgoing.outs.values():
+        for out in self.outgoing.outputs.values():
             out.levels.forget(next(counts))
         for _ in self.lines:
             next(counts)

@@ -43,7 +43,7 @@ class Equipment:
             self.stops[stepper.name] = Stop(core, axis, self._oid(), mine, self._heard, self._level)
         self.inputs = Inputs(core, setup.inputs, stoppers, self.stops, self._oid)
         self.starved = False  # steps had to wait for room on the wire
-        self.outs = {out.name: DigitalOut(core, out, self._oid()) for out in setup.outs}
+        self.outputs = {out.name: DigitalOut(core, out, self._oid()) for out in setup.outputs}
         self._wires: dict[tuple[str, str], Wire] = {}
         self.drivers = {chip.name: Driver(core, chip, self._wire(chip)) for chip in setup.drivers}
         self._triggers = {stop.oid: stop for stop in self.stops.values()}
@@ -84,7 +84,7 @@ class Equipment:
         for stop in self.stops.values():
             commands += stop.config()
         commands += self.inputs.config()
-        commands += [out.config() for out in self.outs.values()]
+        commands += [out.config() for out in self.outputs.values()]
         for wire in self._wires.values():
             commands += wire.config()
         return commands
@@ -126,7 +126,7 @@ class Equipment:
             axis.halt(stopped=shut_down)
         for stop in self.stops.values():
             stop.clear()
-        for out in self.outs.values():
+        for out in self.outputs.values():
             out.shut_down()
         for driver in self.drivers.values():
             driver.shut_down()
@@ -140,7 +140,7 @@ class Equipment:
         settle(self.steppers.values(), now, wall)  # outputs come later with the steps
         for lag in self._lags:
             lag.settle_outputs(wall, heard)
-        for out in self.outs.values():
+        for out in self.outputs.values():
             if out.wants(wall):
                 waits |= out.commit(wall, heard, firm)
         for stop in self.stops.values():
@@ -162,7 +162,7 @@ class Equipment:
     @property
     def _lags(self) -> Iterable[Lag]:
         """Of the units whose outputs are here."""
-        return {id(out.of): out.of for out in self.outs.values() if out.of is not None}.values()
+        return {id(out.of): out.of for out in self.outputs.values() if out.of is not None}.values()
 
     @property
     def renewing(self) -> int:
@@ -212,14 +212,14 @@ class Equipment:
             if stop.pending or stop.alive or not self.steppers[name].resting:
                 changing.append(kept(stop))
                 changing.append(self.steppers[name].kept())
-        changing += [kept(out) for out in self.outs.values() if out.wants(wall)]
+        changing += [kept(out) for out in self.outputs.values() if out.wants(wall)]
         changing += [kept(lag) for lag in self._lags]
         return together(changing)
 
     def deadlines(self) -> list[WallNs | None]:
         """When watchdogs are to be fed, counts compared, driver chips looked after."""
         return [
-            *(out.deadline() for out in self.outs.values()),
+            *(out.deadline() for out in self.outputs.values()),
             *(axis.proof_due() for axis in self.steppers.values()),
             *(stop.deadline() for stop in self.stops.values()),
             *(driver.deadline() for driver in self.drivers.values()),
@@ -227,12 +227,12 @@ class Equipment:
 
     def hungry(self, wall: WallNs) -> bool:
         """Whether a watchdog wants to be fed."""
-        return any(at is not None and wall >= at for at in (out.deadline() for out in self.outs.values()))
+        return any(at is not None and wall >= at for at in (out.deadline() for out in self.outputs.values()))
 
     def feed(self, wall: WallNs, _: int) -> bool:
         """Feed watchdogs. Whether an output waits until stops were heard of."""
         waits, heard = False, self.heard()
-        for out in self.outs.values():
+        for out in self.outputs.values():
             at = out.deadline()
             if at is not None and wall >= at:
                 waits |= out.commit(wall, heard)

@@ -104,8 +104,8 @@ class Faults:
                     unsure = "since the restart nobody knows where the motor stands"
                 self._outgoing.say(Weight.WARNING, f"{what}; {unsure}")
             self._driven_again(ledger)
-        for out in self._outgoing.outs.values():
-            if out.name in self._boards.boards[event.board].outs:
+        for out in self._outgoing.outputs.values():
+            if out.name in self._boards.boards[event.board].outputs:
                 self._outgoing.set_now(out)
         for name, level in event.inputs.items():
             if self._outgoing.inputs.differs(name, int(level)):
@@ -122,7 +122,7 @@ class Faults:
         ledger.guard.release()
         ledger.barred = self._cell.now
         ledger.standing, ledger.why, ledger.known, ledger.awaits = Standing.DRIVEN, "", not ledger.lost, None
-        for out in self._outgoing.outs.values():
+        for out in self._outgoing.outputs.values():
             if out.name == ledger.what.enable:  # it was withheld
                 self._outgoing.set_now(out)
         self._outgoing.currents.begin_again(ledger)

@@ -74,14 +74,14 @@ class Output(Protocol):
 
 
 class Lag:
-    """The lag of a unit, its `axes` on one board or several, and its `outs`.
+    """The lag of a unit, its `axes` on one board or several, and its `outputs`.
 
     `slips` and `slipped`: how often the computer was late, and by how much.
     """
 
     def __init__(self) -> None:
         self.axes: list[Axis] = []
-        self.outs: list[Output] = []
+        self.outputs: list[Output] = []
         self.now: Ns = 0
         self.slips = 0
         self.slipped: Ns = 0
@@ -131,14 +131,14 @@ class Lag:
                     self.now += late.by - slip
                 axis.delayed(axis.next_pulse() or NEVER, late.by - slip, slip=False, own=alone)
         self._grew(lags)
-        for out in self.outs if self._most > before else ():
+        for out in self.outputs if self._most > before else ():
             out.delayed(self._next(), self._most - before, wall)
 
     def settle_outputs(self, wall: WallNs, heard: WallNs | None) -> None:
         """An output is late: what follows comes later, too, where no motion is under way that could not any more."""
         if self.waits:
             return
-        late = [found for out in self.outs if (found := out.late(wall, heard)) is not None]
+        late = [found for out in self.outputs if (found := out.late(wall, heard)) is not None]
         if not late:
             return
         at, by = min(at for at, _ in late), max(by for _, by in late)
@@ -147,7 +147,7 @@ class Lag:
             self._slip(by)
             self.axes[0].delayed(at, by, slip=True, own=False)
             self._grew(lags)
-            for out in self.outs:
+            for out in self.outputs:
                 out.delayed(at, by, wall)
 
     @property

@@ -31,7 +31,7 @@ KEEP_QUIET: Ns = 500 * MS  # where less happens than
 BUSY = 32  # instants: what has to be lived through again from a moment on
 
 
-class Out:
+class CellOutput:
     """An output pin of a unit on a board: what the cell made of it is a channel."""
 
     def __init__(self, name: str, unit: int) -> None:
@@ -47,8 +47,8 @@ class Out:
 class Outgoing:
     """`cell` and its boards: all that those share who drive the one by the other.
 
-    `ledgers` are the driven axes, `outs` the outputs, `lines` what hosts hear, `past` the moments to which the cell can
-    be taken back. See `driven.Driven` for what is given.
+    `ledgers` are the driven axes, `outputs` the outputs, `lines` what hosts hear, `past` the moments to which the cell
+    can be taken back. See `driven.Driven` for what is given.
     """
 
     def __init__(
@@ -62,14 +62,14 @@ class Outgoing:
     ) -> None:
         assert cell.recording is not None
         self.cell, self.boards, self.plan, self.stores, self.wall, self._tell = cell, boards, plan, stores, wall, tell
-        self.outs: dict[tuple[int, str], Out] = {
-            (cell.unit(unit), pin): Out(name, cell.unit(unit)) for (unit, pin), name in plan.outs.items()
+        self.outputs: dict[tuple[int, str], CellOutput] = {
+            (cell.unit(unit), pin): CellOutput(name, cell.unit(unit)) for (unit, pin), name in plan.outputs.items()
         }
         self.ledgers = [
             AxisLedger(what, boards.steppers[what.stepper], Guard(boards.stops[what.stepper]), what.shaft)
             for what in plan.axes
         ]
-        for owner, pin in plan.outs:
+        for owner, pin in plan.outputs:
             cell.parts[cell.unit(owner)].watch(pin)  # of a winding, or of a pulse, every level is told
         self.by_stepper = {ledger.name: ledger for ledger in self.ledgers}
         self._of_unit: dict[int, list[AxisLedger]] = {}
@@ -77,7 +77,7 @@ class Outgoing:
             self._of_unit.setdefault(cell.unit(ledger.what.unit), []).append(ledger)
             if ledger.what.enable:
                 unit = cell.unit(ledger.what.unit)
-                self.outs[unit, ledger.what.enable] = Out(ledger.what.enable, unit)
+                self.outputs[unit, ledger.what.enable] = CellOutput(ledger.what.enable, unit)
         self.clock = CellClock(boards, wall)
         self.inputs = CellInputs(cell, plan)
         self.certainty = Certainty(cell, boards, plan, self.ledgers, wall)
@@ -97,10 +97,10 @@ class Outgoing:
         for ledger in self.ledgers:
             ledger.stepper.adopt(ledger.shaft_at(self.cell.now))
             ledger.standing = Standing.DRIVEN
-        for unit, pin in self.outs:
+        for unit, pin in self.outputs:
             self._level(unit, pin, False, self.cell.now, tell=False)  # until the recording tells better
         self.absorb()
-        for out in self.outs.values():
+        for out in self.outputs.values():
             if out.levels.count == 1:  # it has nothing to tell
                 self.set(out, False, self.cell.now, fresh=True)
         self.past.keep()
@@ -128,7 +128,7 @@ class Outgoing:
     def _counts(self) -> tuple[int, ...]:
         return (
             *(ledger.motions.count for ledger in self.ledgers),
-            *(out.levels.count for out in self.outs.values()),
+            *(out.levels.count for out in self.outputs.values()),
             *(line.count for line in self.lines),
             *(ledger.stages.count for ledger in self.ledgers),
             self.stores.count,
@@ -182,7 +182,7 @@ class Outgoing:
                         if ledger.what.axis == entry.axis:
                             ledger.displace(entry.shaft - ledger.shaft_at(entry.at))
                 elif isinstance(entry, PinSet):
-                    if (unit, entry.pin) in self.outs:
+                    if (unit, entry.pin) in self.outputs:
                         self._level(unit, entry.pin, bool(entry.level), entry.at, tell=tell)
                         found = True
                 elif isinstance(entry, Powered):
@@ -202,47 +202,47 @@ class Outgoing:
         if not entry.on:
             controller = self.cell.parts[unit]
             rests = {pin.name: pin for pin in controller.pins}
-            for place, pin in list(self.outs):
+            for place, pin in list(self.outputs):
                 if place == unit and pin in rests:
-                    self._level(unit, pin, self._off(out=self.outs[unit, pin]), entry.at, tell=tell)
+                    self._level(unit, pin, self._off(out=self.outputs[unit, pin]), entry.at, tell=tell)
 
-    def _off(self, out: Out) -> bool:
+    def _off(self, out: CellOutput) -> bool:
         for setup, _ in self.plan.setups:
-            for each in setup.outs:
+            for each in setup.outputs:
                 if each.name == out.name:
                     return each.off
         return False
 
     def _level(self, unit: int, pin: str, level: bool, at: Ns, *, tell: bool = True) -> None:
-        out = self.outs[unit, pin]
+        out = self.outputs[unit, pin]
         out.levels.append((at, level))
         if tell:
             self.set(out, level, at, fresh=True)
 
-    def set(self, out: Out, level: bool, at: Ns, *, fresh: bool = False) -> None:
+    def set(self, out: CellOutput, level: bool, at: Ns, *, fresh: bool = False) -> None:
         """An output takes a level at cell time `at`; where that is late, and `fresh`, a late computer is to blame."""
         if self._withheld(out):
             return
         ledgers = self._of_unit.get(out.unit)
         lag = ledgers[0].stepper.of.changed(at) if ledgers else 0
-        self.boards.outs[out.name].set(level, at, lag, fresh=fresh)
+        self.boards.outputs[out.name].set(level, at, lag, fresh=fresh)
         self.pending = True
 
-    def set_anew(self, out: Out, count: int, at: Ns) -> None:
+    def set_anew(self, out: CellOutput, count: int, at: Ns) -> None:
         """The board has an output as it was at `at`, behind its first `count` levels, and is told of those since."""
         if self._withheld(out):
             return
-        self.boards.outs[out.name].rewind(at, out.levels.before(count)[-1][1])
+        self.boards.outputs[out.name].rewind(at, out.levels.before(count)[-1][1])
         for when, level in out.levels.since(count):
             self.set(out, level, when)
 
-    def set_now(self, out: Out) -> None:
+    def set_now(self, out: CellOutput) -> None:
         """An output takes the level that it has in the cell, as soon as may be: nobody knows which one it had."""
         if not self._withheld(out):
-            self.boards.outs[out.name].now(out.level)
+            self.boards.outputs[out.name].now(out.level)
             self.pending = True
 
-    def _withheld(self, out: Out) -> bool:
+    def _withheld(self, out: CellOutput) -> bool:
         """Whether an output is not changed, whatever the cell says: it enables the driver of an axis at fault."""
         ledgers = self._of_unit.get(out.unit, ())
         return any(ledger.what.enable == out.name and ledger.standing is Standing.FAULT for ledger in ledgers)

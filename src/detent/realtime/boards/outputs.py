@@ -7,7 +7,7 @@ from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.dictionary import Value
 from detent.realtime.boards.events import OutputLate
 from detent.realtime.boards.lag import Lag
-from detent.realtime.boards.setup import OutSetup
+from detent.realtime.boards.setup import OutputSetup
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, SECOND, Ns
 
@@ -33,13 +33,13 @@ class _Given(NamedTuple):
 
 
 class DigitalOut:
-    """An output of a board; found as `board.outs[name]`. Levels are logical.
+    """An output of a board; found as `board.outputs[name]`. Levels are logical.
 
     `level` is the last one that was given to the board. `corrections` counts the changes that had left when the cell
     was taken back to before them, and were corrected.
     """
 
-    def __init__(self, core: Core, setup: OutSetup, oid: int) -> None:
+    def __init__(self, core: Core, setup: OutputSetup, oid: int) -> None:
         self.name, self.setup, self.oid = setup.name, setup, oid
         self.level = setup.initial
         self.corrections = 0
@@ -57,7 +57,7 @@ class DigitalOut:
     def shares(self, lag: Lag) -> None:
         """It is late together with the axes of `lag`."""
         self.of = lag
-        lag.outs.append(self)
+        lag.outputs.append(self)
 
     def config(self) -> tuple[str, dict[str, Value | str]]:
         """The command that makes it; pins by name."""

@@ -10,7 +10,15 @@ from detent.cell.description import Description, Problem
 from detent.cell.hardware import Board, Hardware
 from detent.controllers.device import Controller, Stage
 from detent.pins import HIGH, PinKind
-from detent.realtime.boards.setup import BoardSetup, DriverSetup, InputSetup, OutSetup, Pin, SetupProblem, StepperSetup
+from detent.realtime.boards.setup import (
+    BoardSetup,
+    DriverSetup,
+    InputSetup,
+    OutputSetup,
+    Pin,
+    SetupProblem,
+    StepperSetup,
+)
 from detent.ticks import MS, US, Ns
 
 MOST_MARGIN: Ns = 4 * MS
@@ -51,7 +59,7 @@ class Plan(NamedTuple):
 
     setups: tuple[tuple[BoardSetup, str], ...]
     axes: tuple[DrivenAxis, ...]
-    outs: Mapping[UnitPin, str]
+    outputs: Mapping[UnitPin, str]
     inputs: Mapping[str, UnitPin]
     board_of: Mapping[str, str]  # of each input
     lead: Ns  # the longest of all boards
@@ -67,7 +75,7 @@ class Plan(NamedTuple):
         if fault.item in {setup.name for setup, _ in self.setups}:
             key = f"boards.{fault.item}.{sub or 'serial'}"
         elif fault.key == "watchdog":
-            setup = next(s for s, _ in self.setups if any(out.name == fault.item for out in s.outs))
+            setup = next(s for s, _ in self.setups if any(out.name == fault.item for out in s.outputs))
             key = f"boards.{setup.name}.watchdog"
         elif fault.key and fault.key != "pin":
             key = f"{key}.{sub}"
@@ -82,7 +90,7 @@ def plan(described: Description, controllers: Mapping[str, Controller], least_le
     if not described.hardware:
         raise Problem(described.file, "hardware", "no pin of this cell is real: add [boards.NAME] and [hardware.UNIT]")
     axes, keys = [], {}
-    outs: dict[UnitPin, str] = {}
+    outputs: dict[UnitPin, str] = {}
     inputs: dict[str, UnitPin] = {}
     board_of: dict[str, str] = {}
     used = [name for name in described.boards if any(t.board == name for t in described.hardware.values())]
@@ -94,8 +102,9 @@ def plan(described: Description, controllers: Mapping[str, Controller], least_le
         for pin, text in table.outputs.items():
             found = next(p for p in controller.pins if p.name == pin)
             rest = found.rest == HIGH or found.kind is PinKind.OPEN_COLLECTOR
-            outs[unit, pin] = name = f"{unit}.{pin}"
-            here.outs.append(OutSetup(name, Pin.parse(text), rest, rest, described.boards[table.board].watchdog, unit))
+            outputs[unit, pin] = name = f"{unit}.{pin}"
+            watchdog = described.boards[table.board].watchdog
+            here.outputs.append(OutputSetup(name, Pin.parse(text), rest, rest, watchdog, unit))
             keys[name] = f"{where}.outputs.{pin}"
         for pin, text in table.inputs.items():
             name = f"{unit}.{pin}"
@@ -112,7 +121,7 @@ def plan(described: Description, controllers: Mapping[str, Controller], least_le
     setups = tuple((hang[name].setup(name, board), board.serial) for name, board in zip(used, boards, strict=True))
     held = all(board.replies == "held" for board in boards)
     lead = max(board.lead for board in boards)
-    return Plan(setups, tuple(axes), outs, inputs, board_of, lead, held, described.file, keys, _stand_ins(described))
+    return Plan(setups, tuple(axes), outputs, inputs, board_of, lead, held, described.file, keys, _stand_ins(described))
 
 
 def _stand_ins(described: Description) -> tuple[StandIn, ...]:
@@ -135,13 +144,13 @@ class _Hang:
 
     def __init__(self) -> None:
         self.steppers: list[StepperSetup] = []
-        self.outs: list[OutSetup] = []
+        self.outputs: list[OutputSetup] = []
         self.inputs: list[InputSetup] = []
         self.drivers: list[DriverSetup] = []
 
     def setup(self, name: str, board: Board) -> BoardSetup:
         margin = board.margin or max(min(MOST_MARGIN, board.lead // 3), MS)
-        return BoardSetup(name, board.lead, board.error, margin, tuple(self.steppers), tuple(self.outs),
+        return BoardSetup(name, board.lead, board.error, margin, tuple(self.steppers), tuple(self.outputs),
                           tuple(self.inputs), tuple(self.drivers))  # fmt: skip
 
 
@@ -163,15 +172,15 @@ def _axis(
     keys[key] = where
     if table.enable is not None:
         axis = axis._replace(enable=f"{key}.enable")
-        enable = OutSetup(axis.enable, Pin.parse(table.enable), watchdog=board.watchdog, unit=axis.unit, supply=True)
-        here.outs.append(enable)
+        enable = OutputSetup(axis.enable, Pin.parse(table.enable), watchdog=board.watchdog, unit=axis.unit, supply=True)
+        here.outputs.append(enable)
         keys[axis.enable] = f"{where}.enable"
     driver = table.driver
     if driver is not None and driver.kind == "plain":
         assert driver.half is not None
         axis = axis._replace(half=f"{key}.half")
-        half = OutSetup(axis.half, Pin.parse(driver.half), initial=True, off=True, watchdog=board.watchdog)
-        here.outs.append(half)
+        half = OutputSetup(axis.half, Pin.parse(driver.half), initial=True, off=True, watchdog=board.watchdog)
+        here.outputs.append(half)
         keys[axis.half] = f"{where}.driver.half"
     elif driver is not None and driver.kind != "plain":
         axis = axis._replace(driver=f"{key}.driver")

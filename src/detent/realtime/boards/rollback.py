@@ -13,7 +13,7 @@ from detent.realtime.boards.axis_ledger import AxisLedger, Motion
 from detent.realtime.boards.channels import alike
 from detent.realtime.boards.events import Stopped
 from detent.realtime.boards.faults import Faults
-from detent.realtime.boards.outgoing import Out, Outgoing
+from detent.realtime.boards.outgoing import CellOutput, Outgoing
 from detent.realtime.boards.past import Moment
 from detent.realtime.boards.states import Standing, Weight
 from detent.realtime.pace import WallNs
@@ -141,7 +141,7 @@ class Rollback:
                     count, _rests(before, ledger.shaft_at(at) if here is None else here)
                 )
             place = len(self._ledgers)
-            for out in self._outgoing.outs.values():
+            for out in self._outgoing.outputs.values():
                 count = moment.counts[place] + self._levels_in(batches, out)
                 levels[out.name], places[out.name] = out.levels.cut(count), count
                 place += 1
@@ -185,7 +185,7 @@ class Rollback:
                 stopped.guard.want(inputs, when, when)
         self._outgoing.arm()
         self._outgoing.commit()
-        for out in self._outgoing.outs.values():
+        for out in self._outgoing.outputs.values():
             self._tell_out(out, levels[out.name], places[out.name], at)
         self._outgoing.pending = True
 
@@ -198,7 +198,7 @@ class Rollback:
             for entry in entries
         )
 
-    def _levels_in(self, batches: Sequence[Batch], out: Out) -> int:
+    def _levels_in(self, batches: Sequence[Batch], out: CellOutput) -> int:
         """How many items of the channel of an output these entries make."""
         count = 0
         for unit, entries in batches:
@@ -206,7 +206,7 @@ class Rollback:
                 continue
             for entry in entries:
                 if isinstance(entry, PinSet):
-                    count += self._outgoing.outs.get((unit, entry.pin)) is out
+                    count += self._outgoing.outputs.get((unit, entry.pin)) is out
                 elif isinstance(entry, Powered):
                     enables = any(ledger.what.enable == out.name for ledger in self._outgoing.of_unit(unit))
                     count += enables or not entry.on
@@ -246,7 +246,7 @@ class Rollback:
         for motion in (*([force] if force is not None else []), *new):
             ledger.stepper.tell(motion)
 
-    def _tell_out(self, out: Out, old: list[tuple[Ns, bool]], count: int, at: Ns) -> None:
+    def _tell_out(self, out: CellOutput, old: list[tuple[Ns, bool]], count: int, at: Ns) -> None:
         """Tell the boards what an output does behind its first `count` levels, where it did `old` before."""
         new = out.levels.since(count)
         same = alike(old, new)

@@ -74,7 +74,7 @@ class StepperSetup:
 
 
 @dataclass(frozen=True, slots=True)
-class OutSetup:
+class OutputSetup:
     """A digital output. Levels are logical: an active low pin is low where it is told True.
 
     `initial` is how it comes up, `off` what it falls to at a shutdown, and, with a `watchdog`, when nobody has
@@ -144,7 +144,7 @@ class BoardSetup:
     error: Error = US
     margin: Ns = 4 * MS
     steppers: tuple[StepperSetup, ...] = ()
-    outs: tuple[OutSetup, ...] = ()
+    outputs: tuple[OutputSetup, ...] = ()
     inputs: tuple[InputSetup, ...] = ()
     drivers: tuple[DriverSetup, ...] = field(default=())
 
@@ -155,7 +155,7 @@ class BoardSetup:
 
     def items(self) -> "list[Item]":
         """Everything on it that has a name and pins."""
-        return [*self.steppers, *self.outs, *self.inputs, *self.drivers]
+        return [*self.steppers, *self.outputs, *self.inputs, *self.drivers]
 
     def check(self) -> None:
         """Raise SetupProblem for what is wrong on any board: names and pins used twice, values out of range."""
@@ -175,7 +175,7 @@ class BoardSetup:
                     raise SetupProblem(item.name, key, f"the pin {pin.name} is taken by {used[pin.name]}; "
                                        "use another for one of them")  # fmt: skip
                 used.setdefault(pin.name, f"{item.name}.{key}")
-        for out in self.outs:
+        for out in self.outputs:
             if out.watchdog is not None and out.watchdog < max(200 * MS, 4 * self.lead):
                 raise SetupProblem(out.name, "watchdog", f"{out.watchdog / MS:g} ms is less than a busy computer "
                                    f"needs; take {max(200 * MS, 4 * self.lead) / MS:g} ms or more")  # fmt: skip
@@ -190,7 +190,7 @@ class BoardSetup:
                 raise SetupProblem(entry.name, "sample", "an input is sampled 1 to 255 times, every 10 us to 10 ms")
 
 
-Item: TypeAlias = StepperSetup | OutSetup | InputSetup | DriverSetup
+Item: TypeAlias = StepperSetup | OutputSetup | InputSetup | DriverSetup
 
 
 def _pins(item: Item) -> list[tuple[str, Pin]]:

@@ -56,7 +56,7 @@ OF_INPUTS: Words = {
     "buttons_ack": ("oid", "count"),
     "buttons_state": ("oid", "ack_count", "state"),
 }
-OF_OUTS: Words = {
+OF_OUTPUTS: Words = {
     "config_digital_out": ("oid", "pin", "value", "default_value", "max_duration"),
     "queue_digital_out": ("oid", "clock", "on_ticks"),
     "update_digital_out": ("oid", "value"),
@@ -71,14 +71,14 @@ OF_SPI: Words = {
     "spi_transfer": ("oid", "data"),
     "spi_transfer_response": ("oid", "response"),
 }
-EVERYTHING: Words = {**ALWAYS, **OF_STEPPERS, **OF_INPUTS, **OF_OUTS, **OF_UARTS, **OF_SPI}
+EVERYTHING: Words = {**ALWAYS, **OF_STEPPERS, **OF_INPUTS, **OF_OUTPUTS, **OF_UARTS, **OF_SPI}
 
 
 def required(setup: BoardSetup) -> Words:
     """What the firmware of a board has to know."""
     found = dict(ALWAYS)
     for present, words in (
-        (setup.steppers, OF_STEPPERS), (setup.steppers or setup.inputs, OF_INPUTS), (setup.outs, OF_OUTS),
+        (setup.steppers, OF_STEPPERS), (setup.steppers or setup.inputs, OF_INPUTS), (setup.outputs, OF_OUTPUTS),
         ([chip for chip in setup.drivers if chip.uart is not None], OF_UARTS),
         ([chip for chip in setup.drivers if chip.uart is None], OF_SPI),
     ):  # fmt: skip
@@ -108,7 +108,7 @@ def unsuited(setup: BoardSetup, found: Dictionary) -> tuple[str, str, str] | Non
         if other != name:  # under one name it was looked for before
             return item, key, f"{name} is the pin {other}, which is taken by {owner}; use another for one of them"
     most = MOST_WATCHDOG // found.frequency
-    for out in setup.outs:
+    for out in setup.outputs:
         if out.watchdog is not None and out.watchdog * found.frequency // SECOND > MOST_WATCHDOG:
             what = f"{out.watchdog / SECOND:g} s is more than its clock can count; take {most} s or less"
             return out.name, "watchdog", what
