@@ -10,8 +10,8 @@ import pytest
 from caproto import ChannelType
 from tests.bridges.test_epics_puts import Client, Served, served
 
+from detent.bridges.epics import client_limits
 from detent.bridges.epics import ioc as served_records
-from detent.bridges.epics import room
 from detent.bridges.epics import server as channel_access
 from detent.bridges.epics.values import check_number
 
@@ -148,7 +148,7 @@ def test_of_one_client_not_more_puts_are_under_way_than_a_bound_and_a_stop_is_he
 
 
 def test_the_client_that_is_silent_longest_makes_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(room, "CLIENTS", 3)
+    monkeypatch.setattr(client_limits, "CLIENTS", 3)
 
     async def test(ioc: Served) -> None:
         silent, *others = [await ioc.client() for _ in range(3)]
@@ -167,7 +167,7 @@ def test_the_client_that_is_silent_longest_makes_room(monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize("what", ["WATCHED", "HELD"])
 def test_the_client_that_holds_most_makes_room(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(room, what, 40)
+    monkeypatch.setattr(client_limits, what, 40)
 
     async def test(ioc: Served) -> None:
         greedy, client = await ioc.client(), await ioc.client()

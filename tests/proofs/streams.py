@@ -1,6 +1,6 @@
 """What a host, a hand and bad luck may do to one unit: mostly what the manual has, some of it damaged, some noise.
 
-The actions are those of `tests.controllers.laws`, made from a number. Weight is on what broke things before: control
+The actions are those of `tests.controllers.laws`, made from a number. Severity is on what broke things before: control
 characters, frames that are nearly right, inputs that change in one instant, the supply, damaged images.
 """
 

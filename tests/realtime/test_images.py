@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from detent.realtime import belonging
+from detent.realtime import image_names
 from detent.realtime import images as module
 from detent.realtime.images import (
     Images,
@@ -248,7 +248,7 @@ def test_a_cell_that_is_moved_or_renamed_finds_its_images_again(cell: Path, tmp_
 def test_a_process_that_stands_still_with_the_lock_is_not_waited_for_without_an_end(
     cell: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(belonging, "PATIENCE", 0.0)
+    monkeypatch.setattr(image_names, "PATIENCE", 0.0)
     with open(tmp_path / "state" / "cells.lock") as other:
         lock(other.fileno())
         with pytest.raises(ImagesUnusable, match=r"another process has .*cells.lock and does not let go of it; choose"):

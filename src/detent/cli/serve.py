@@ -256,14 +256,14 @@ def _real_pins(notifier: "Notifier") -> "RealPins":
     A service manager is told how much each matters, by the prefix that its journal takes (sd-daemon(3)).
     """
     from detent.realtime.boards.drive import RealPins
-    from detent.realtime.boards.states import News, Weight
+    from detent.realtime.boards.states import News, Severity
 
-    grave = {Weight.FAULT: "<3>", Weight.WARNING: "<4>"} if notifier.heard else {}
+    grave = {Severity.FAULT: "<3>", Severity.WARNING: "<4>"} if notifier.heard else {}
 
     def tell(news: News) -> None:
-        if news.weight is not Weight.NOTE:
-            notifier.status(f"{news.weight.value} at {news.at / 1e9:.3f} s: {news.text}")
-        weight = f"{grave.get(news.weight, '')}detent: {news.at / 1e9:.3f} s: {news.weight.value}"
+        if news.severity is not Severity.NOTE:
+            notifier.status(f"{news.severity.value} at {news.at / 1e9:.3f} s: {news.text}")
+        weight = f"{grave.get(news.severity, '')}detent: {news.at / 1e9:.3f} s: {news.severity.value}"
         print(f"{weight}: {news.text}", file=sys.stderr, flush=True)
 
     return RealPins(tell)

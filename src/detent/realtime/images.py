@@ -20,7 +20,7 @@ from itertools import count
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from detent.realtime.belonging import SUFFIX, claim, safe
+from detent.realtime.image_names import SUFFIX, claim, safe
 from detent.realtime.kept import read_kept
 from detent.realtime.system import NO_LINK, lock
 
@@ -64,7 +64,7 @@ def default_folder(environment: Mapping[str, str] = os.environ) -> Path:
 
 
 def cell_name(target: str, *, is_file: bool) -> str:
-    """A name for what is kept of a cell, other than its images, which `belonging` names.
+    """A name for what is kept of a cell, other than its images, which `image_names` names.
 
     A model gives its own name. A cell file gives its stem and eight digits made of its absolute path, so that
     two files of one name share nothing.

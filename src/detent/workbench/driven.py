@@ -23,7 +23,7 @@ from detent.realtime.boards.certainty import CERTAIN
 from detent.realtime.boards.drive import Opened, RealPins
 from detent.realtime.boards.driven import Driven
 from detent.realtime.boards.replies import HeldStores
-from detent.realtime.boards.states import News, Standing, Weight
+from detent.realtime.boards.states import News, Severity, Standing
 from detent.realtime.cell_source import CellSource
 from detent.realtime.loop import Companion, ServedLine, stopped_by_signals, wake_exactly
 from detent.realtime.pace import Pace, WallNs
@@ -190,10 +190,10 @@ class DrivenEngine(Engine):
 
     def _on_wire(self) -> Callable[[str], None]:
         """A machine goes on while its host is away."""
-        return lambda text: self._news(News(self._driven.now, Weight.WARNING, text))
+        return lambda text: self._news(News(self._driven.now, Severity.WARNING, text))
 
     def _news(self, news: News) -> None:
-        kind = "action" if news.weight is Weight.NOTE else "error"
+        kind = "action" if news.severity is Severity.NOTE else "error"
         self._marks.put(news.at, kind, news.text)
         self._quiet = False
 

@@ -37,9 +37,9 @@ from detent.controllers import catalogue
 from detent.outputs.units import views
 from detent.pins import Level
 from detent.realtime import breaking
-from detent.realtime.belonging import safe
 from detent.realtime.cell_source import CellSource, find_cell
 from detent.realtime.endpoints.endpoint import Endpoint
+from detent.realtime.image_names import safe
 from detent.realtime.images import Images, cell_name
 from detent.realtime.loop import BEHIND, Companion, Loop, ServedLine, stopped_by_signals, wake_exactly
 from detent.realtime.names import Names

@@ -10,7 +10,7 @@ from random import Random
 import pytest
 from tests.realtime.boards.driven_bench import Bench
 
-from detent.realtime.boards.states import AxisState, Standing, Weight
+from detent.realtime.boards.states import AxisState, Severity, Standing
 from detent.ticks import MS, SECOND, US, Ns
 
 CELL = """
@@ -128,7 +128,7 @@ class Session:
                 assert state.known
                 assert state.shaft == bench.position(name), bench.news
         if not self.befallen:
-            assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+            assert not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
             assert len({(state.slips, state.slipped) for state in self.axes().values()}) == 1, "a slip is of the unit"
         for name, (axis, low, high) in self.limits.items():
             places = [0, *(place for _, place in bench.edges(axis))]
@@ -178,7 +178,7 @@ def test_a_reset_in_mid_move_of_both_stops_one_and_counts_what_the_other_made_me
         bench.run(300 * MS)
         other = "x.Y" if shared == "a" else "x.X"
         [news] = bench.news
-        assert news.weight is Weight.WARNING
+        assert news.severity is Severity.WARNING
         assert news.text.startswith(f"{other}: ")
         assert news.text.endswith("are counted all the same")
         stopped = [bench.position(axis) for axis in AXES]

@@ -9,7 +9,7 @@ from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench, pulses
 
 from detent.realtime.boards.fake.board import FakeBoard
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import MS, SECOND, US, Ns
 
 CELL = """
@@ -38,8 +38,8 @@ def levels(bench: Bench, pin: str, board: str = "b") -> list[tuple[Ns, bool]]:
     return [(scale.time(tick), level) for tick, name, level in bench.machines[board].edges if name == pin]
 
 
-def weights(bench: Bench) -> list[Weight]:
-    return [news.weight for news in bench.news]
+def weights(bench: Bench) -> list[Severity]:
+    return [news.severity for news in bench.news]
 
 
 def test_outputs_change_with_the_pulses_they_belong_to() -> None:
@@ -284,7 +284,7 @@ def test_a_stalled_computer_slips_once_and_loses_nothing() -> None:
         bench.stall(60 * MS)
         bench.rest()
         assert bench.driven.ledgers[0].stepper.slips == 1
-        assert weights(bench) == [Weight.WARNING]
+        assert weights(bench) == [Severity.WARNING]
         assert "slipped by" in bench.news[0].text
         assert [place for _, place in bench.edges("x")] == list(range(1, 401))
         assert bench.boards.boards["b"].state.value == "ready"
@@ -304,7 +304,7 @@ def test_an_emergency_stop_stands_until_recover_and_goes_on_without_configuring(
         state = bench.driven.axes()[0]
         assert state.standing is Standing.FAULT
         assert not state.known
-        assert weights(bench) == [Weight.FAULT]
+        assert weights(bench) == [Severity.FAULT]
         assert levels(bench, "gpio4")[-1][1] is True, "the driver is off"
         bench.type("x", "+10")  # the controller takes it, the axis does not move
         bench.run(200 * MS)
@@ -475,7 +475,7 @@ def test_a_recovery_that_comes_to_nothing_is_told(back: dict[str, Any], why: str
         port.board = FakeBoard(**back, first_tick=board.now, reset="config_reset") if back else board
         bench.driven.recover()
         bench.run(8 * SECOND)
-        assert weights(bench) == [Weight.FAULT, Weight.FAULT]
+        assert weights(bench) == [Severity.FAULT, Severity.FAULT]
         assert re.search(rf"^x still stands: cell\.toml: {why}.*; mend that, then recover$", bench.news[-1].text)
         assert re.search(why, bench.driven.axes()[0].why)
         port.board, port.spoil = board, None
@@ -590,7 +590,7 @@ def holds(seed: int) -> None:
         bench.run(50 * MS)
         bench.rest()
         state = bench.driven.axes()[0]
-        assert not [news for news in bench.news if news.weight is not Weight.NOTE], bench.news
+        assert not [news for news in bench.news if news.severity is not Severity.NOTE], bench.news
         told = pulses(bench.driven.ledgers[0].motions.since(0), bench.cell.now)
         edges = bench.edges("x")
         assert [place for _, place in edges] == [place for _, place in told]

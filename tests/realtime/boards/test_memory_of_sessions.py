@@ -12,7 +12,7 @@ from tests.realtime.boards.driven_bench import Bench, no_file
 
 from detent.cell.build import build
 from detent.cell.description import parse
-from detent.realtime.boards.states import Weight
+from detent.realtime.boards.states import Severity
 from detent.ticks import MS, US, Ns
 
 CELL = """
@@ -146,7 +146,7 @@ class Session:
             assert self.disk.images == self.ideal(), bench.news
             assert self.disk.images == [] or self.disk.images[-1] == bench.cell.controller("x").kept_memory()
             assert bench.driven.rollback.escaped == 0
-            assert self.rough or not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+            assert self.rough or not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
             return len(self.disk.images)
 
 

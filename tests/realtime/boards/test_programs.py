@@ -150,7 +150,7 @@ def run(model: str, seed: int) -> int:
                      "supersigma": []}[model]:  # fmt: skip
             typed(bench, model, stop, random)
         bench.rest()
-        assert not [news for news in bench.news if news.weight.value == "fault"], bench.news
+        assert not [news for news in bench.news if news.severity.value == "fault"], bench.news
         assert all(state.standing.value == "driven" for state in bench.driven.axes())
         return check(bench, bench.cell.now)
 

@@ -14,7 +14,7 @@ from tests.realtime.boards.driven_bench import Bench
 from tests.realtime.boards.random_cells import RandomCell
 from tests.realtime.boards.test_stalls import EXPOSED
 
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import MS, SECOND, US, Ns
 
 
@@ -155,7 +155,7 @@ class Session:
                 bench.check_microsteps()
         assert bench.driven.rollback.escaped == 0 or cell.replies == "at once"
         if not self.befallen:
-            assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+            assert not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
         for state, name in zip(bench.driven.axes(), cell.steppers, strict=True):
             assert state.standing is Standing.DRIVEN, state.why
             assert not state.moving, name

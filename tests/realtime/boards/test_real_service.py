@@ -82,7 +82,7 @@ def test_control_looks_stops_and_recovers(served: tuple[Service, Wall, list[News
     run(service, wall, 300 * MS)
     state = control.do("board", {})
     assert state["axes"]["x"]["standing"] == "driven"  # type: ignore[index]
-    assert [item.weight.value for item in news] == ["fault", "warning"], news
+    assert [item.severity.value for item in news] == ["fault", "warning"], news
 
 
 @pytest.mark.parametrize(
@@ -246,7 +246,7 @@ def test_a_mushroom_button_in_the_supply_of_the_motors_is_told_and_recover_sets_
         control.do("type", {"text": "+10"})
         run(service, wall, 1 * SECOND)
         assert machine.axes["x"].position == place + 10
-    assert [item.weight.value for item in news if item.weight.value != "note"] == ["fault", "warning"], news
+    assert [item.severity.value for item in news if item.severity.value != "note"] == ["fault", "warning"], news
 
 
 MACHINE = """

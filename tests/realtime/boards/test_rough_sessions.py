@@ -11,7 +11,7 @@ import pytest
 from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench
 
-from detent.realtime.boards.states import AxisState, Standing, Weight
+from detent.realtime.boards.states import AxisState, Severity, Standing
 from detent.ticks import MS, US, Ns
 
 UNIT = """
@@ -128,7 +128,7 @@ def session(seed: int) -> int:
             if state.board not in rough.restarted:
                 assert state.shaft == bench.position(state.unit), state.unit
         assert replies == "at once" or bench.driven.rollback.escaped == 0
-        return sum(news.weight is Weight.FAULT for news in bench.news)
+        return sum(news.severity is Severity.FAULT for news in bench.news)
 
 
 def test_what_befalls_a_board_is_told_and_leaves_the_other_alone() -> None:

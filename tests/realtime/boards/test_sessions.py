@@ -12,7 +12,7 @@ import pytest
 from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench, pulses
 
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import MS, SECOND, US, Ns
 
 BOARD = '[boards.b]\nserial = "fake"\nlead = "{lead} ms"\n'
@@ -141,7 +141,7 @@ def session(kind: str, seed: int) -> int:
         bench.rest(20 * SECOND)
         bench.check_inputs()
         bench.check_outputs()
-        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
         assert bench.driven.rollback.escaped == 0
         for state, stepper in zip(bench.driven.axes(), what.steppers, strict=True):
             assert state.standing is Standing.DRIVEN
@@ -192,7 +192,7 @@ def held_at_once(seed: int) -> None:
             bench.type("x", end)
             bench.run(50 * MS)
         bench.rest(5 * SECOND)
-        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
         [state] = bench.driven.axes()
         assert state.shaft == bench.position("x") != 0
 
@@ -232,7 +232,7 @@ def tapped(seed: int) -> None:
         bench.press("x.RST", 1)
         bench.run(800 * MS)
         bench.rest(5 * SECOND)
-        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
         assert not any(state.moving for state in bench.driven.axes()), "a reset was lost"
         assert [state.shaft for state in bench.driven.axes()] == [bench.position("x.X"), bench.position("x.Y")]
         assert bench.driven.rollback.escaped == 0
@@ -287,7 +287,7 @@ def test_an_input_that_stops_two_axes_stops_both_and_each_count_is_the_boards(la
         stopped = [bench.position("x.X"), bench.position("x.Y")]
         assert stopped[0] > 50
         assert stopped[1] < -20
-        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
         assert [state.shaft for state in bench.driven.axes()] == stopped
         assert [state.stops for state in bench.driven.axes()] == [1, 1]
         bench.press("x.RST", 1)

@@ -14,7 +14,7 @@ import pytest
 from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench, pulses
 
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import MS, SECOND, US, Ns
 
 GS = """
@@ -91,7 +91,7 @@ def session(seed: int, *, writes: bool) -> tuple[int, int]:
         bench.run(SECOND)
         bench.rest()
         state = bench.driven.axes()[0]
-        assert sum(news.weight is Weight.FAULT for news in bench.news) == down, bench.news
+        assert sum(news.severity is Severity.FAULT for news in bench.news) == down, bench.news
         assert state.standing is Standing.DRIVEN
         assert bench.boards.boards["b"].state.value == "ready"
         assert state.shaft == bench.position("x")
@@ -139,7 +139,7 @@ def held_up(seed: int) -> tuple[int, int]:
         bench.rest()
         state = bench.driven.axes()[0]
         assert state.standing is Standing.DRIVEN
-        assert sum(news.weight is Weight.FAULT for news in bench.news) == down, bench.news
+        assert sum(news.severity is Severity.FAULT for news in bench.news) == down, bench.news
         assert state.shaft == bench.position("x") == bench.boards.steppers["x"].counted()
         if not down:
             never_closer(bench)

@@ -10,7 +10,7 @@ from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench
 from tests.realtime.boards.test_sessions import BOARD, KINDS
 
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import MS, SECOND, US
 
 INPUTS = {
@@ -53,7 +53,7 @@ def session(kind: str, seed: int) -> None:
         bench.rest(20 * SECOND)
         bench.check_inputs()
         bench.check_outputs()
-        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
         assert bench.driven.rollback.escaped == 0
         for state, stepper in zip(bench.driven.axes(), what.steppers, strict=True):
             assert state.standing is Standing.DRIVEN

@@ -6,7 +6,7 @@ import pytest
 from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench
 
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import MS, US, Ns
 
 CELL = """
@@ -65,7 +65,7 @@ def run(seed: int) -> int:
         bench.check_outputs()
         places = [place for _, place in bench.edges("x")]
         assert all(-edge <= place <= edge for place in places), f"{min(places)} to {max(places)} of {edge}"
-        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
         state = bench.driven.axes()[0]
         assert state.standing is Standing.DRIVEN
         assert state.shaft == bench.position("x") == (places[-1] if places else 0)
@@ -118,7 +118,7 @@ def asked_while_late(seed: int) -> int:
         bench.check_inputs()
         bench.check_outputs()
         assert bench.driven.rollback.escaped == 0, bench.news
-        assert not [news for news in bench.news if news.weight is Weight.FAULT], bench.news
+        assert not [news for news in bench.news if news.severity is Severity.FAULT], bench.news
         state = bench.driven.axes()[0]
         assert state.shaft == bench.position("x") <= edge
         assert len(stored) <= asked.count("S")

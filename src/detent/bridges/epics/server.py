@@ -19,7 +19,7 @@ from caproto import CAStatus
 from caproto.asyncio import server
 from caproto.server.common import DisconnectedCircuit
 
-from detent.bridges.epics.room import CLIENTS, Room
+from detent.bridges.epics.client_limits import CLIENTS, ClientLimits
 from detent.bridges.epics.values import Refused, not_whole
 
 OFTEN: Final = 10  # lines about what clients sent wrongly, and then
@@ -172,7 +172,7 @@ class Context(server.Context):  # type: ignore[misc]
     def __init__(self, pvs: dict[str, Any], interfaces: list[str] | None) -> None:
         super().__init__(pvs, interfaces)
         self.subscription_queue = _AtOnce(self)
-        self._room = Room(self.circuits)
+        self._limits = ClientLimits(self.circuits)
         for channel in pvs.values():
             channel.max_subscription_backlog = NEWEST
 
@@ -184,7 +184,7 @@ class Context(server.Context):  # type: ignore[misc]
 
     async def tcp_handler(self, client: Any, address: Any) -> None:
         """Serve a client. Where there are `CLIENTS` already, the one that was silent longest leaves."""
-        silent = self._room.too_silent()
+        silent = self._limits.too_silent()
         if silent is not None:
             self.log.warning("more than %d clients: the one that was silent longest was left", CLIENTS)
             await silent.leave()
@@ -201,7 +201,7 @@ class Context(server.Context):  # type: ignore[misc]
 
     async def make_room(self, field: Any | None) -> None:
         """A channel was made, or a monitor of `field`: leave the client that has most, where all have too many."""
-        found = self._room.too_many(field)
+        found = self._limits.too_many(field)
         if found is not None:
             circuit, why = found
             circuit.log.warning("%s: the client with most of them was left", why)

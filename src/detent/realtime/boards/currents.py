@@ -10,7 +10,7 @@ from detent.realtime.boards.axis_ledger import AxisLedger
 from detent.realtime.boards.boards import Boards
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.setup import SetupProblem
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import MS, NEVER, Ns
 
 SETTING: Ns = 25 * MS  # what a chip takes at most to be told of other microsteps: five registers, and a batch before
@@ -19,7 +19,9 @@ SETTING: Ns = 25 * MS  # what a chip takes at most to be told of other microstep
 class Currents:
     """Of all driven axes. `say` tells people, `refused` is told of an axis whose driver cannot do what is commanded."""
 
-    def __init__(self, boards: Boards, plan: Plan, told: Callable[[], Ns], say: Callable[[Weight, str], None]) -> None:
+    def __init__(
+        self, boards: Boards, plan: Plan, told: Callable[[], Ns], say: Callable[[Severity, str], None]
+    ) -> None:
         """`told`: the cell time up to which everything is known of the pins."""
         self._boards, self._plan, self._told, self._say = boards, plan, told, say
         self.refused: Callable[[AxisLedger, str], None] = lambda ledger, why: None
@@ -75,7 +77,7 @@ class Currents:
         if stage.chops and most is not None and asked > most and ledger.limited != asked:
             ledger.limited = asked
             what = f"{ledger.what.unit} commands {asked:g} A a phase"
-            self._say(Weight.NOTE, f"{ledger.name}: {what}, and its driver gives {most:g} A (amperes)")
+            self._say(Severity.NOTE, f"{ledger.name}: {what}, and its driver gives {most:g} A (amperes)")
         try:
             driver.command(stage)
         except SetupProblem as problem:

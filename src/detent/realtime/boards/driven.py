@@ -21,7 +21,7 @@ from detent.realtime.boards.outgoing import Outgoing
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.replies import HeldLine, HeldStores
 from detent.realtime.boards.rollback import Rollback
-from detent.realtime.boards.states import AxisState, BoardState, News, Standing, Weight
+from detent.realtime.boards.states import AxisState, BoardState, News, Severity, Standing
 from detent.realtime.pace import Pace, WallNs
 from detent.ticks import MS, NEVER, Ns
 from detent.uart import Chars
@@ -253,7 +253,7 @@ class Driven:
             ]
             if pins and unit not in self._stepped_by_pins:
                 what = "every pulse is a step now, and a board looks at its inputs once a millisecond"
-                self.outgoing.say(Weight.WARNING, f"{unit}: on {', '.join(pins)} {what}: steps may be lost")
+                self.outgoing.say(Severity.WARNING, f"{unit}: on {', '.join(pins)} {what}: steps may be lost")
             (self._stepped_by_pins.add if pins else self._stepped_by_pins.discard)(unit)
 
     def _forget(self) -> None:

@@ -3,7 +3,7 @@
 from detent.realtime.boards.axis_ledger import AxisLedger
 from detent.realtime.boards.events import BY_HAND, Recovered
 from detent.realtime.boards.outgoing import Outgoing
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import NEVER
 
 
@@ -31,7 +31,7 @@ class Faults:
                 ledger.why, ledger.known = why, False
         if stood:  # a recovery that came to nothing, or a board that failed in another way meanwhile
             who = f"{', '.join(ledger.name for ledger in mine)} still stands: " if mine else ""
-            self._outgoing.say(Weight.FAULT, f"{who}{why}; mend that, then recover")
+            self._outgoing.say(Severity.FAULT, f"{who}{why}; mend that, then recover")
 
     def fault(self, ledger: AxisLedger, why: str, *, known: bool = True) -> None:
         """An axis does not move any more: its unit is halted, and told so whenever it tries."""
@@ -42,7 +42,7 @@ class Faults:
         ledger.guard.want({}, self._cell.now, self._cell.now)  # what has left is watched until it is over
         ledger.barred = self._cell.now
         if first:
-            self._outgoing.say(Weight.FAULT, f"{ledger.name} stands: {why}; look at the machine, then recover")
+            self._outgoing.say(Severity.FAULT, f"{ledger.name} stands: {why}; look at the machine, then recover")
 
     def place(self, ledger: AxisLedger, shaft: int) -> None:
         """The motor stands at `shaft`: so the counters say, too."""
@@ -92,7 +92,7 @@ class Faults:
             shaft = event.shafts.get(ledger.name)
             if shaft is None:
                 what = f"{ledger.name}: board {event.board} was restarted, and nobody knows where the motor stands"
-                self._outgoing.say(Weight.WARNING, f"{what}: send it home before anything else")
+                self._outgoing.say(Severity.WARNING, f"{what}: send it home before anything else")
                 ledger.stepper.adopt(ledger.shaft_at(self._cell.now))
                 ledger.lost = True
             else:
@@ -102,7 +102,7 @@ class Faults:
                 unsure = "the motor may have lost steps when it was stopped"
                 if ledger.lost:
                     unsure = "since the restart nobody knows where the motor stands"
-                self._outgoing.say(Weight.WARNING, f"{what}; {unsure}")
+                self._outgoing.say(Severity.WARNING, f"{what}; {unsure}")
             self._driven_again(ledger)
         for out in self._outgoing.outputs.values():
             if out.name in self._boards.boards[event.board].outputs:
@@ -116,7 +116,7 @@ class Faults:
         unsure = "" if ledger.known else "; the motor may have lost steps while it stood"
         ledger.stepper.rewind(shaft)
         self._driven_again(ledger)
-        self._outgoing.say(Weight.WARNING if unsure else Weight.NOTE, f"{ledger.name} goes on at {shaft}{unsure}")
+        self._outgoing.say(Severity.WARNING if unsure else Severity.NOTE, f"{ledger.name} goes on at {shaft}{unsure}")
 
     def _driven_again(self, ledger: AxisLedger) -> None:
         ledger.guard.release()
@@ -130,4 +130,4 @@ class Faults:
 
     def _not_written(self, unit: str) -> None:
         what = f"the memory of {unit} could not be written, after it had answered that it was"
-        self._outgoing.say(Weight.WARNING, f"{what}: at the next start it has what it kept before")
+        self._outgoing.say(Severity.WARNING, f"{what}: at the next start it has what it kept before")

@@ -21,7 +21,7 @@ from detent.realtime.boards.faults import Faults
 from detent.realtime.boards.outgoing import Outgoing
 from detent.realtime.boards.rollback import Rollback
 from detent.realtime.boards.setup import SetupProblem
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import show_duration
 
 
@@ -58,9 +58,9 @@ class Incoming:
                 slips = ledger.stepper.slips
                 who = stepper if len(ledger.stepper.of.axes) == 1 else ledger.what.unit
                 what = f"{who} slipped by {show_duration(by)}: the computer was late; no step is lost"
-                self._outgoing.say(Weight.WARNING, f"{what} ({slips} {'slip' if slips == 1 else 'slips'} so far)")
+                self._outgoing.say(Severity.WARNING, f"{what} ({slips} {'slip' if slips == 1 else 'slips'} so far)")
             case OutputLate(_, out, _, by):
-                self._outgoing.say(Weight.WARNING, f"{out} changed {show_duration(by)} late: the computer was late")
+                self._outgoing.say(Severity.WARNING, f"{out} changed {show_duration(by)} late: the computer was late")
             case CountDiffers(_, stepper, shaft, counted):
                 ledger = self._by_stepper[stepper]
                 if ledger.standing is Standing.DRIVEN:
@@ -72,7 +72,7 @@ class Incoming:
                 remedy = "switch the board off and on, recover, and send it home"
                 if ledger.standing is Standing.FAULT:
                     self._outgoing.say(
-                        Weight.FAULT, f"{ledger.name}: {what}, so nobody knows where the motor stands; {remedy}"
+                        Severity.FAULT, f"{ledger.name}: {what}, so nobody knows where the motor stands; {remedy}"
                     )
                 else:
                     self._faults.fault(ledger, f"{what}, so nobody knows where the motor stands: {remedy}", known=False)
@@ -89,7 +89,7 @@ class Incoming:
                     if ledger.what.driver == driver and ledger.standing is not Standing.FAULT:
                         self._faults.fault(ledger, f"its driver: {reason}", known=False)
             case DriverSet(_, driver, what):
-                self._outgoing.say(Weight.NOTE, f"{driver}: {what}")
+                self._outgoing.say(Severity.NOTE, f"{driver}: {what}")
             case Refusal(board, item, key, text):
                 problem = self._outgoing.plan.problem(SetupProblem(item or board, key, text))
                 self._faults.board_failed(board, str(problem))

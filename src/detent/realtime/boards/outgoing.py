@@ -22,7 +22,7 @@ from detent.realtime.boards.guard import Guard
 from detent.realtime.boards.past import Past
 from detent.realtime.boards.plan import Plan
 from detent.realtime.boards.replies import HeldLine, HeldStores
-from detent.realtime.boards.states import News, Standing, Weight
+from detent.realtime.boards.states import News, Severity, Standing
 from detent.realtime.pace import Pace, WallNs
 from detent.ticks import MS, NEVER, Ns
 
@@ -112,9 +112,9 @@ class Outgoing:
         self.boards.commit(self.cell.now, self.committed, self.wall)
         self.pending = False
 
-    def say(self, weight: Weight, text: str) -> None:
+    def say(self, severity: Severity, text: str) -> None:
         """Tell people, once."""
-        self._tell(News(self.cell.now, weight, text))
+        self._tell(News(self.cell.now, severity, text))
 
     @property
     def held_since(self) -> Ns:

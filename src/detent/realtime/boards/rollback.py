@@ -15,7 +15,7 @@ from detent.realtime.boards.events import Stopped
 from detent.realtime.boards.faults import Faults
 from detent.realtime.boards.outgoing import CellOutput, Outgoing
 from detent.realtime.boards.past import Moment
-from detent.realtime.boards.states import Standing, Weight
+from detent.realtime.boards.states import Severity, Standing
 from detent.realtime.pace import WallNs
 from detent.ticks import MS, Ns
 
@@ -175,7 +175,7 @@ class Rollback:
                 self.escaped += 1
                 instead = "" if right is None else f"; it would be {right.char.value:#04x}"
                 what = f"a host heard {wrong.char.value:#04x} of {wrong.at / 1e9:.4f} s before a stop took it back"
-                self._outgoing.say(Weight.WARNING, what + instead)
+                self._outgoing.say(Severity.WARNING, what + instead)
         self._tell_ledgers(stopped, event, motions, counts)
         self._outgoing.hold()
         for ledger, shaft in zip(at_fault, stood, strict=True):
@@ -272,7 +272,7 @@ class Rollback:
         if motion is None and event.shaft != here:
             if abs(event.shaft - here) > 1:
                 what = f"{event.shaft - here:+d} steps that had left when a stop was told are counted all the same"
-                self._outgoing.say(Weight.WARNING, f"{ledger.name}: {what}")
+                self._outgoing.say(Severity.WARNING, f"{ledger.name}: {what}")
             self._faults.place(ledger, event.shaft)
         ledger.stepper.rewind(event.shaft)
         if motion is not None:
@@ -295,7 +295,7 @@ class Rollback:
         """Pulses left that the cell did not give after all: it is told where the motor is, and the axis stands."""
         if ledger.what.unit == stopped.what.unit and ledger.motion is None:  # it is ahead of the other, which slipped
             what = f"{lost} steps that had left when a late stop of {stopped.name} was told are counted all the same"
-            self._outgoing.say(Weight.WARNING, f"{ledger.name}: {what}")
+            self._outgoing.say(Severity.WARNING, f"{ledger.name}: {what}")
             self._faults.place(ledger, ledger.stepper.shaft)
             return
         what = f"{lost} steps left the pins though a stop of {stopped.name} took them back"

@@ -43,8 +43,8 @@ class BoardState(NamedTuple):
     move_count: int
 
 
-class Weight(Enum):
-    """How much something matters."""
+class Severity(Enum):
+    """How much it matters to whoever looks after the machine."""
 
     NOTE = "note"
     WARNING = "warning"
@@ -55,5 +55,5 @@ class News(NamedTuple):
     """Something that people are told once, in one line."""
 
     at: Ns  # cell time
-    weight: Weight
+    severity: Severity
     text: str

@@ -22,7 +22,7 @@ class Holder(Protocol):
         """How many monitors of a field it has."""
 
 
-class Room:
+class ClientLimits:
     """Counts what `holders` hold, exactly only where it may be too much."""
 
     def __init__(self, holders: Iterable[Any]) -> None:

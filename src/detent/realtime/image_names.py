@@ -23,11 +23,11 @@ from detent.toml import written
 
 SUFFIX = ".eeprom"
 PATIENCE = 5.0  # seconds for another process that looks for a name, which takes milliseconds
-_MOST_KEY = 1 << 20  # bytes of a NAME.cell
+_MOST_OWNER = 1 << 20  # bytes of a NAME.cell
 _HEAD = "# Whose EEPROM images these are: the files of this name with .UNIT.eeprom. Cell moved: its path here.\n"
 
 
-class Key(NamedTuple):
+class Owner(NamedTuple):
     """What a `NAME.cell` says."""
 
     name: str
@@ -52,18 +52,20 @@ def claim(folder: Path, target: str, models: Mapping[str, str], *, is_file: bool
     units = ", ".join(f"{unit} {model}" for unit, model in sorted(models.items()))
     folder.mkdir(parents=True, exist_ok=True)
     with _alone(folder):
-        keys = list(_keys(folder))
-        own = next((key for key in keys if key.path == str(path)), None)
+        owners = list(_owners(folder))
+        own = next((owner for owner in owners if owner.path == str(path)), None)
         reports: list[str] = []
         if own is None:
-            own = _left_behind([key for key in keys if _has_images(folder, key.name)], path, units, folder, reports)
+            own = _left_behind(
+                [owner for owner in owners if _has_images(folder, owner.name)], path, units, folder, reports
+            )
         if own is None:
-            taken = {key.name for key in keys if os.path.lexists(key.path)} | set(MODELS)
+            taken = {owner.name for owner in owners if os.path.lexists(owner.path)} | set(MODELS)
             name = _free(folder, stem, taken)
             _take_old_names(folder, f"{stem}-{hashlib.sha256(os.fsencode(path)).hexdigest()[:8]}", name)
         else:
             name = own.name
-        _write_key(folder, Key(name, str(path), _file(path), units))
+        _write_owner(folder, Owner(name, str(path), _file(path), units))
     return Claim(name, reports)
 
 
@@ -94,21 +96,23 @@ def safe(name: str) -> str:
     return changed if changed == name else f"{changed}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
-def _left_behind(keys: list[Key], path: Path, units: str, folder: Path, reports: list[str]) -> Key | None:
+def _left_behind(owners: list[Owner], path: Path, units: str, folder: Path, reports: list[str]) -> Owner | None:
     """The images of a cell file that is gone, if it is this one that was moved; what is not certain is reported."""
-    gone = [key for key in keys if not os.path.lexists(key.path)]
-    moved = [key for key in gone if key.file == _file(path)]
-    moved = moved or [key for key in gone if key.units == units and Path(key.path).stem == path.stem]
+    gone = [owner for owner in owners if not os.path.lexists(owner.path)]
+    moved = [owner for owner in gone if owner.file == _file(path)]
+    moved = moved or [owner for owner in gone if owner.units == units and Path(owner.path).stem == path.stem]
     if len(moved) == 1:
         reports.append(f"{path} was {moved[0].path}: its EEPROM images {folder / moved[0].name}.*{SUFFIX} are used")
         return moved[0]
-    for key in keys:
-        images = f"{folder / key.name}.*{SUFFIX}"
-        if key in gone and key.units == units:
-            what = f"if it was {key.path}, its images are {images}: write its path into {folder / key.name}.cell"
+    for owner in owners:
+        images = f"{folder / owner.name}.*{SUFFIX}"
+        if owner in gone and owner.units == units:
+            what = f"if it was {owner.path}, its images are {images}: write its path into {folder / owner.name}.cell"
             reports.append(f"{path} begins with empty EEPROMs; {what}")
-        elif key not in gone and Path(key.path).stem == path.stem:
-            reports.append(f"{path} begins with empty EEPROMs: {images} are those of {key.path}, which is there still")
+        elif owner not in gone and Path(owner.path).stem == path.stem:
+            reports.append(
+                f"{path} begins with empty EEPROMs: {images} are those of {owner.path}, which is there still"
+            )
     return None
 
 
@@ -142,12 +146,12 @@ def _file(path: Path) -> str:
     return f"{found.st_dev}:{found.st_ino}"
 
 
-def _keys(folder: Path) -> Iterator[Key]:
+def _owners(folder: Path) -> Iterator[Owner]:
     """Every `NAME.cell` that can be read."""
     for place in sorted(folder.glob("*.cell")):
         try:
-            facts = tomllib.loads(_decoded(read_kept(place, _MOST_KEY)))
-            yield Key(place.name.removesuffix(".cell"), str(facts["path"]), str(facts["file"]), str(facts["units"]))
+            facts = tomllib.loads(_decoded(read_kept(place, _MOST_OWNER)))
+            yield Owner(place.name.removesuffix(".cell"), str(facts["path"]), str(facts["file"]), str(facts["units"]))
         except (OSError, ValueError, KeyError, RecursionError):
             continue
 
@@ -157,12 +161,12 @@ def _decoded(data: bytes) -> str:
     return data.decode("utf-8", "surrogateescape")
 
 
-def _write_key(folder: Path, key: Key) -> None:
-    place = folder / f"{key.name}.cell"
-    facts = key._asdict().items()
+def _write_owner(folder: Path, owner: Owner) -> None:
+    place = folder / f"{owner.name}.cell"
+    facts = owner._asdict().items()
     text = _HEAD + "".join(f"{name} = {written(value)}\n" for name, value in facts if name != "name")
     with suppress(OSError):
-        if _decoded(read_kept(place, _MOST_KEY)) == text:
+        if _decoded(read_kept(place, _MOST_OWNER)) == text:
             return
     temporary = place.with_name(f"{place.name}.new")
     temporary.unlink(missing_ok=True)
