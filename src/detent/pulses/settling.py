@@ -18,6 +18,7 @@ from detent.ticks import Ns
 
 MOST_PLACES = 40
 LEAST_PLACES = 4
+MANY = 2000  # estimates of which NumPy finds the least, which is 0 or more, sooner than it counts those that are not 0
 GUARD = 4  # units: twice what 8 rounding errors and the rounding to places can make
 
 
@@ -73,6 +74,6 @@ def settle(
     np.right_shift(bits, scale.shift, out)
     np.add(out, shift_of(base, scale), out)
     np.bitwise_and(bits, scale.masks[guard], bits)
-    if np.count_nonzero(bits) < len(bits):
+    if (bits.min() == 0) if len(bits) > MANY else (np.count_nonzero(bits) < len(bits)):
         for i in np.flatnonzero(bits == 0).tolist():
             out[i] = exact(i)
