@@ -90,17 +90,19 @@ class RecentLog(Log[T]):
     An action with many characters counts as several: `WEIGHT` of them as one more.
     """
 
-    __slots__ = ("_weight", "forgotten", "most")
+    __slots__ = ("_weight", "forgotten", "most", "weighed")
 
     def __init__(self, most: int = MOST_ACTIONS) -> None:
         super().__init__()
         self.most, self.forgotten = most, 0
-        self._weight = 0
+        self._weight = self.weighed = 0  # as how many counts what is kept, and everything up to now
 
     def append(self, item: T) -> None:
         """Add one item."""
         super().append(item)
-        self._weight += _weight(item)
+        weight = _weight(item)
+        self._weight += weight
+        self.weighed += weight
         if self._weight > 2 * self.most:
             kept, weight = 0, 0
             while kept < self._size and weight + _weight(self._items[self._size - 1 - kept]) <= self.most:
@@ -113,7 +115,7 @@ class RecentLog(Log[T]):
     def __deepcopy__(self, memo: object) -> "RecentLog[T]":
         twin = super().__deepcopy__(memo)
         twin.most, twin.forgotten = self.most, self.forgotten
-        twin._weight = self._weight  # noqa: SLF001 (its own class)
+        twin._weight, twin.weighed = self._weight, self.weighed  # noqa: SLF001 (its own class)
         return twin
 
 

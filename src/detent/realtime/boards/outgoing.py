@@ -265,7 +265,7 @@ class Outgoing:
 
     def _worn(self, now: Ns) -> bool:
         """Whether the newest moment that was kept is too long ago to live on from quickly."""
-        if not self.past.moments:
+        if self.past.worn:
             return True
         away = now - self.past.moments[-1].now
         return away >= (KEEP if self.instants >= BUSY else KEEP_QUIET)

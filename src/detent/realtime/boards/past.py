@@ -12,7 +12,7 @@ from detent.cell.cell import Cell
 from detent.realtime.watch import RecentLog
 from detent.ticks import Ns
 
-MOST_ACTIONS = 4_000  # kept
+MANY_ACTIONS = 1_000  # behind which another moment is kept; the journal keeps 20 times as many
 
 
 class Moment(NamedTuple):
@@ -33,8 +33,13 @@ class Past:
 
     def __init__(self, cell: Cell, counts: Callable[[], tuple[int, ...]]) -> None:
         self.cell, self._counts = cell, counts
-        cell.journal, cell.journaling = RecentLog(MOST_ACTIONS), True
+        cell.journal, cell.journaling = RecentLog(), True
         self.moments: list[Moment] = []
+
+    @property
+    def worn(self) -> bool:
+        """Whether so much was done to the cell since a moment was kept that another one is due."""
+        return not self.moments or _weighed(self.cell) - _weighed(self.moments[-1].cell) >= MANY_ACTIONS
 
     def keep(self) -> Moment:
         """Keep a copy of the cell as it is. Everything it did must have been taken over."""
@@ -49,8 +54,13 @@ class Past:
         return self.moments[0] if self.moments else None
 
     def reaches(self, at: Ns) -> bool:
-        """Whether a moment at or before `at` is kept."""
-        return bool(self.moments) and self.moments[0].now <= at
+        """Whether a moment at or before `at` is kept, and everything that was done to the cell since."""
+        base = self._base(at)
+        return base is not None and base.actions >= self.cell.journal.forgotten
+
+    def _base(self, at: Ns) -> Moment | None:
+        """The last moment that is kept at or before `at`."""
+        return next((moment for moment in reversed(self.moments) if moment.now <= at), None)
 
     def back(
         self,
@@ -63,11 +73,12 @@ class Past:
         """The cell is as it was at `at`; `actions` are done there, and then it lives on to its present.
 
         What was done to it later is done again, but what is to `drop`. `arrived` is called at `at`, before the actions,
-        with the moment from which it was run, `lived` behind each eventful instant from there on. IndexError where no
-        moment is kept that is old enough.
+        with the moment from which it was run, `lived` behind each eventful instant from there on. Only where it
+        `reaches`.
         """
         cell, present = self.cell, self.cell.now
-        base = [moment for moment in self.moments if moment.now <= at][-1]
+        base = self._base(at)
+        assert base is not None
         since = cell.journal.since(base.actions)
         vars(cell).update(vars(base.cell.copy()))
         later = [action for action in since if action.at > at and not drop(action)]
@@ -82,6 +93,12 @@ class Past:
             perform(cell, action)
             lived()
         _live(cell, present, lived)
+
+
+def _weighed(cell: Cell) -> int:
+    """How much was done to a cell whose journal is a `RecentLog`."""
+    assert isinstance(cell.journal, RecentLog)
+    return cell.journal.weighed
 
 
 def _live(cell: Cell, until: Ns, lived: Callable[[], None]) -> None:
