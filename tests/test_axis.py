@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from detent.axis import Axis, Moment, MotionCut, MotionEnded, MotionStarted
+from detent.axis import Axis, Displaced, Moment, MotionCut, MotionEnded, MotionStarted
 from detent.pulses import Train, Uniform
 from detent.ticks import MS, NEVER, to_fixed
 
@@ -192,3 +192,22 @@ def test_pulses_are_counted_as_they_are_told(steps: int, events: list[tuple[int,
                 axis.advance(axis.deadline)
         twin = copy.deepcopy(axis)
         assert twin.pulses_at(now) == axis.pulses_at(now) == axis.shaft_at(now) == told(now)
+
+
+@given(st.integers(1, 9), st.integers(-500, 500), st.sampled_from([1, -1]))
+def test_a_held_axis_that_is_found_elsewhere_goes_on_from_there(given_: int, by: int, direction: int) -> None:
+    """All pulses that are left come, and the counts say where the shaft is, at each of them."""
+    axis, out = made(shaft=100)
+    axis.start(steady(10), direction, (), 0)
+    with pytest.raises(RuntimeError, match="the axis is moving"):
+        axis.displace(by, 0)
+    axis.gate(False, given_ * MS)
+    axis.advance(axis.deadline)
+    here = 100 + direction * given_
+    assert (axis.shaft_at(50 * MS), out[-1]) == (here, MotionCut((given_ + 1) * MS, given_))
+    axis.displace(by, 50 * MS)
+    assert (axis.shaft_at(50 * MS), out[-1]) == (here + by, Displaced(50 * MS, here + by))
+    axis.gate(True, 60 * MS)
+    assert axis.shaft_at(61 * MS) == here + by + 2 * direction or given_ == 9
+    axis.advance(axis.deadline)
+    assert (axis.shaft, axis.pulses, axis.moving) == (100 + 10 * direction + by, 10, False)

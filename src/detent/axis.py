@@ -181,11 +181,14 @@ class Axis:
         self._rest(given)
 
     def displace(self, by: int, now: Ns) -> None:
-        """The shaft, at rest, is found `by` steps from where it was commanded to. RuntimeError while it moves."""
-        if self.train is not None:
+        """The shaft is found `by` steps from where it was commanded to. RuntimeError while pulses come.
+
+        At rest, or held: then the pulses that are left come from there.
+        """
+        if self.train is not None and not self._held:
             raise RuntimeError("the axis is moving: `cut` it first")
         self.shaft += by
-        self._out.append(Displaced(now, self.shaft, self.name))
+        self._out.append(Displaced(now, self.shaft_at(now), self.name))
 
     def gate(self, is_open: bool, now: Ns) -> None:
         """Shut or open the gate. A pulse that falls due while it is shut is held, and given when it opens.

@@ -8,6 +8,7 @@ import pytest
 from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench, pulses
 
+from detent.realtime.boards.events import Stopped
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.states import Severity, Standing
 from detent.ticks import MS, SECOND, US, Ns
@@ -656,3 +657,33 @@ def test_a_stop_longer_ago_than_is_kept_is_a_fault_where_the_motor_stands() -> N
         state = bench.driven.axes()[0]
         assert bench.position("x") == 200 == state.shaft
         assert max(place for _, place in bench.edges("x")) == 200
+
+
+def test_an_axis_that_is_held_is_told_where_its_motor_stands() -> None:
+    """Steps that had left when a second stop was told: the counter has them, and what is left of the move comes."""
+    with Bench(CELL) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+500")
+        bench.run(300 * MS)
+        bench.press("x.ENABLE", 0)
+        bench.run(300 * MS)
+        [ledger] = bench.driven.ledgers
+        here = bench.position("x")
+        assert ledger.motion is None
+        assert 0 < here == ledger.shaft_at(bench.cell.now) < 500
+        stop = Stopped("b", "x", "x.ENABLE", False, bench.cell.now, bench.cell.now, here + 3, False)
+        bench.driven.rollback.stopped_too(ledger, stop)
+        assert bench.driven.axes()[0].shaft == here + 3
+        assert bench.cell.controller("x").status(bench.cell.now).position == here + 3
+        bench.press("x.ENABLE", 1)
+        bench.rest()
+        state = bench.driven.axes()[0]  # no such steps had left in truth: the board's count says so
+        assert state.why == "the board has counted 500 where the cell has 503"
+        assert (state.shaft, bench.position("x")) == (500, 500)
+
+
+def test_a_stop_before_the_first_instant_of_a_cell_is_one_that_takes_it_back() -> None:
+    """A board that gets everything late by more than the cell is old tells such times."""
+    with Bench(CELL) as bench:
+        [ledger] = bench.driven.ledgers
+        assert not bench.driven.rollback._stands(ledger, -23 * MS)

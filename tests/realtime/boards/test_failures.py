@@ -299,6 +299,7 @@ def refusal(made: BoardSetup, fake: FakeBoard | None = None, port: dict[str, Any
         ({"inputs": (InputSetup("EOT", Pin("gpoi10")), )}, {}, ("EOT", "pin"), "no pin gpoi10; it has gpio10"),
         ({"outputs": (OutputSetup("MOV", Pin("gpio1")),)}, {}, ("MOV", "pin"), "needs gpio1 itself, for serial"),
         ({}, {"leave_out": ("config_trsync", "buttons_query")}, ("", ""), "has no config_trsync, buttons_query; flash"),
+        ({}, {"window": 64}, ("", ""), "takes 64 bytes at once (RECEIVE_WINDOW)"),
         ({"outputs": (OutputSetup("E", Pin("gpio4"), watchdog=60 * SECOND),)}, {"frequency": 72_000_000},
          ("E", "watchdog"), "take 14 s or less"),
         ({"drivers": (DriverSetup("d", "tmc5160", 0.1, select=Pin("gpio20"), bus="spi9"),)}, {}, ("d", "bus"),

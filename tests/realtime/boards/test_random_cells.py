@@ -6,6 +6,7 @@ and every output on its pin as in the cell; no axis has passed its limits, and n
 
 from collections.abc import Sequence
 from random import Random
+from typing import Any
 
 import pytest
 from tests.generated import seeds
@@ -51,11 +52,18 @@ class Session:
         def away(_: bool) -> Ns:
             return random.randrange(90 * MS) if self.late and random.random() < self.away else 0
 
+        boards: dict[str, Any] = {}
+        if self.rich:
+            boards["frequency"] = random.choice([8, 16, 48, 72, 180, 520]) * 1_000_000
+            boards["moves"] = random.choice([40, 64, 400, 1024])
+            ticks = 0, (1 << 31) - 1000, (1 << 32) - 50_000_000, random.randrange(1 << 36)
+            boards["first_tick"] = random.choice(ticks)
+            boards["window"] = random.choice([None, 128, 192])
         spoil = lossy(Random(random.random()), self.loss) if self.loss else None
         line_timing = self.rich and random.random() < 0.5
         return Bench(
             self.cell.text, switches=self.cell.switches, jitter=lambda: random.randrange(jitter), away=away,
-            spare_exposed=True, chips=True, read=self.cell.files.__getitem__, line_timing=line_timing,
+            spare_exposed=True, chips=True, board=boards, read=self.cell.files.__getitem__, line_timing=line_timing,
             port={
                 "drift": random.choice([0.0, 60.0, -90.0]), "delay": random.choice([30, 100, 800]) * US, "spoil": spoil,
             },
@@ -150,7 +158,7 @@ class Session:
         bench.check_outputs()
         bench.check_drivers(late=self.away > 0)
         if self.kept and not self.befallen and not bench.driven.rollback.rewinds:
-            bench.check_levels()
+            bench.check_levels(late=self.away > 0 or self.stalled)
             if not self.away and not self.stalled:
                 bench.check_microsteps()
         assert bench.driven.rollback.escaped == 0 or cell.replies == "at once"

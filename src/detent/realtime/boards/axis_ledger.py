@@ -36,9 +36,8 @@ class AxisLedger:
         self.limited = 0.0  # amperes that were asked of its driver and are more than it gives; told
         self.awaits: tuple[str, WallNs] | None = None  # an input has stopped another axis, and this one too; since when
         self.held: tuple[str, bool, int] | None = None  # which input stopped it last, by which level, and where
-        self.barred: Ns = (
-            -1
-        )  # no stop takes the cell back to before this time: the motor was elsewhere than the cell had it
+        # no stop takes the cell back to before this time: the motor was elsewhere than the cell had it
+        self.barred: Ns = PAST
         self.singles = 0  # so many times in a row a single pulse after the last time
         self._shaft = shaft  # at rest
 

@@ -238,7 +238,7 @@ class Board:
     def starving(self) -> bool:
         """Whether steps have waited for room on the wire, and there is room again."""
         wanted = ROOM + self._equipment.renewing
-        return self.state is State.READY and self._equipment.starved and self.core.link.spare >= wanted
+        return self.state is State.READY and self._equipment.starved and self.core.link.enough(wanted)
 
     def heard(self) -> WallNs | None:
         """Whatever its stops did up to this wall time was told; None: none of them can do anything."""

@@ -140,9 +140,7 @@ class Equipment:
         settle(self.steppers.values(), now, wall)  # outputs come later with the steps
         for lag in self._lags:
             lag.settle_outputs(wall, heard)
-        for out in self.outputs.values():
-            if out.wants(wall):
-                waits |= out.commit(wall, heard, firm)
+        waits |= self._change(wall, heard, firm)
         for stop in self.stops.values():
             if stop.dry(wall) and not self.steppers[stop.stepper].resting:
                 stop.ask_dry(wall)
@@ -157,6 +155,14 @@ class Equipment:
         self._send([axis for axis in self.steppers.values() if not axis.of.waits], now, wall, most)
         for name, due in self._dues().items():
             self.stops[name].behind_steps(due, wall)
+        return waits | self._change(wall, heard, firm)
+
+    def _change(self, wall: WallNs, heard: WallNs | None, firm: Ns) -> bool:
+        """Give outputs what is due soon. Whether one waits until stops were heard of."""
+        waits = False
+        for out in self.outputs.values():
+            if out.wants(wall):
+                waits |= out.commit(wall, heard, firm)
         return waits
 
     @property
@@ -190,7 +196,7 @@ class Equipment:
             if due is not None:
                 turns.append((due, number, runs))
         heapify(turns)
-        while turns and most and self._core.link.spare >= ONE_RUN + self.renewing:
+        while turns and most and self._core.link.enough(ONE_RUN + self.renewing):
             most -= 1
             _, number, runs = turns[0]
             due = next(runs, None)

@@ -92,6 +92,10 @@ class Lag:
         """Whether an axis ran dry, and has yet to be told what it did not make: the others go on with it."""
         return any(axis.dried for axis in self.axes)
 
+    def has_yet_to_step(self, at: Ns) -> bool:
+        """Whether a pulse for cell time `at` or before it has not left: it may be late, and so may what is due then."""
+        return any((pulse := axis.next_pulse()) is not None and pulse <= at for axis in self.axes)
+
     def rested(self, first: Ns, now: Ns) -> None:
         """At cell time `now` an axis begins to move, its first pulse at `first`: all of them may have been at rest."""
         late = any(axis.lag for axis in self.axes)

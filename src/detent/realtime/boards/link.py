@@ -19,6 +19,7 @@ MOST_UNDER_WAY = 7  # blocks; a board tells 16 apart, and what it said of as man
 FIRST_PATIENCE: WallNs = 25 * MS  # without an acknowledgement, before blocks are sent again; doubles each time
 MOST_PATIENCE: WallNs = 1000 * MS
 FILL = bytes((END,)) * LARGEST  # what a board waits for that has got a block with a damaged length
+WASTE = 16  # bytes at most that a block has left where the next message does not fit in
 NAK_QUIET: WallNs = 3 * MS  # requests that follow each other so closely are about the same loss
 
 
@@ -79,11 +80,20 @@ class Link:
     @property
     def spare(self) -> int:
         """So many bytes of messages may be sent at once: what waits for an acknowledgement may leave too late."""
-        blocks = MOST_UNDER_WAY - len(self._under_way)
-        room = blocks * ROOM
-        if self.window is not None:
-            room = min(room, self.window - SMALLEST * blocks - self._bytes_under_way)
+        room = self._room(MOST_UNDER_WAY - len(self._under_way), self._bytes_under_way)
         return room - sum(map(len, self._waiting)) if self._waiting else room
+
+    def enough(self, wanted: int) -> bool:
+        """Whether so many bytes may be sent at once, or as many as ever may."""
+        return self.spare >= min(wanted, self._room(MOST_UNDER_WAY, 0))
+
+    def _room(self, blocks: int, taken: int) -> int:
+        """Bytes of messages for which there is room in so many blocks, and in a window of which some is `taken`."""
+        room = blocks * ROOM
+        if self.window is None:
+            return room
+        full, rest = divmod(max(self.window - taken, 0), LARGEST - WASTE)
+        return min(room, full * (ROOM - WASTE) + max(rest - SMALLEST, 0))
 
     def sync(self, wall: WallNs) -> None:
         """Ask for the number that the board expects; again until it has answered."""

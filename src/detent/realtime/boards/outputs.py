@@ -148,6 +148,7 @@ class DigitalOut:
         while (
             self._pending
             and not (self.of is not None and self.of.waits)
+            and (self._switches_on() or not (self.of is not None and self.of.has_yet_to_step(self._pending[0].at)))
             and (self._pending[0].tick <= horizon or self._pending[0].at <= firm or self._switches_on())
         ):
             if known is not None and known < self._pending[0].tick < soonest and not self._switches_on():

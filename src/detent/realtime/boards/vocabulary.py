@@ -14,6 +14,7 @@ Words: TypeAlias = Mapping[str, tuple[str, ...]]
 """Commands and responses with the fields that are used of each."""
 
 MOST_WATCHDOG = 1 << 30  # ticks: the firmware's clock has 32 bits
+LEAST_WINDOW = 128  # bytes that a board takes at once; with less, steps wait for each other
 
 ALWAYS: Words = {
     "allocate_oids": ("count",),
@@ -93,6 +94,10 @@ def unsuited(setup: BoardSetup, found: Dictionary) -> tuple[str, str, str] | Non
     if missing or not found.frequency:
         return "", "", (f"its firmware ({found.version or 'without a version'}) has no {', '.join(missing)}; flash it "
                         "with a current one")  # fmt: skip
+    window = found.receive_window
+    if window is not None and window < LEAST_WINDOW:
+        what = f"its firmware takes {window} bytes at once (RECEIVE_WINDOW), and steps come late with less than"
+        return "", "", f"{what} {LEAST_WINDOW}; flash it with one that has a larger receive buffer"
     reserved = {found.number("pin", pin): use for pin, use in found.reserved.items() if found.has_pin(pin)}
     names: dict[int, tuple[str, str]] = {}
     for item, key, name in _all_pins(setup):
