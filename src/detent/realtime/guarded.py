@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
-from detent.realtime.loop import Served, ServedLine
+from detent.realtime.loop import Companion, Served, ServedLine
+from detent.realtime.pace import WallNs
 from detent.ticks import Ns
 from detent.uart import Chars
 
@@ -51,3 +52,50 @@ class Guarded:
         kind = "" if isinstance(error, (RuntimeError, ValueError)) and str(error) else f"{type(error).__name__}: "
         self.stopped = f"the cell has stopped at {self.now / 1e9:.6f} s: {kind}{error}"
         self._on_stop(self.stopped)
+
+
+class GuardedCompanion:
+    """What is served along with a cell, its boards, say: where it raises something, the cell stops in the same way.
+
+    It is served on all the same, as a board may have to be told once more to stop.
+    """
+
+    def __init__(self, companion: Companion, guarded: Guarded) -> None:
+        self._companion, self._guarded = companion, guarded
+
+    def reading(self) -> Sequence[int]:
+        """Descriptors that may have something to read."""
+        return self._companion.reading()
+
+    def writing(self) -> Sequence[int]:
+        """Descriptors that wait for room."""
+        return self._companion.writing()
+
+    def deadline(self) -> WallNs | None:
+        """When `serve` is to be called at the latest."""
+        try:
+            return self._companion.deadline()
+        except Exception as error:  # whatever it is, here and below: nobody knows any more what the motors do
+            self._guarded.stop(error)
+            return None
+
+    def receive(self, descriptor: int) -> None:
+        """Something can be read."""
+        try:
+            self._companion.receive(descriptor)
+        except Exception as error:
+            self._guarded.stop(error)
+
+    def flush(self, descriptor: int) -> None:
+        """Something can be written."""
+        try:
+            self._companion.flush(descriptor)
+        except Exception as error:
+            self._guarded.stop(error)
+
+    def serve(self) -> None:
+        """The cell is at its present, and what could be read was: called once in each wake-up."""
+        try:
+            self._companion.serve()
+        except Exception as error:
+            self._guarded.stop(error)

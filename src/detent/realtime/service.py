@@ -30,7 +30,7 @@ from detent.realtime.endpoints.opened import Openings
 from detent.realtime.endpoints.returning import Returning
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.endpoints.unsettling import Unsettling
-from detent.realtime.guarded import Guarded
+from detent.realtime.guarded import Guarded, GuardedCompanion
 from detent.realtime.images import Images
 from detent.realtime.loop import BEHIND, Loop, Timer, stopped_by_signals, wake_exactly
 from detent.realtime.pace import LatenessSummary, Pace
@@ -117,7 +117,8 @@ class Service:
             self.watched = Watched(self.driven or self.cell, self.pace) if observed else None
             self.guarded = Guarded(self.watched or self.driven or self.cell, self._stopped)
             self._on_stop = on_stop
-            self._loop = Loop(self.guarded, self.pace, self._opened, patience=patience, companion=self.driven,
+            companion = None if self.driven is None else GuardedCompanion(self.driven, self.guarded)
+            self._loop = Loop(self.guarded, self.pace, self._opened, patience=patience, companion=companion,
                               timers=timers)  # fmt: skip
             opening.callback(self._loop.close)
             self._cleanup = opening.pop_all()

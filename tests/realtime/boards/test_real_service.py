@@ -293,3 +293,29 @@ def test_a_fake_board_has_the_machine_of_the_cell_file_behind_it() -> None:
         assert found == same
         assert port.board.machine.steps == []  # nobody reads them
     assert not news
+
+
+@pytest.mark.parametrize("where", ["deadline", "receive", "flush", "serve"])
+def test_what_fails_between_cell_and_board_stops_motors_and_not_the_service(
+    served: tuple[Service, Wall, list[News]], where: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service, wall, _ = served
+    driven = service.driven
+    assert driven is not None
+    run(service, wall, 100 * MS)
+    Control(service).do("type", {"text": "+3000"})
+    run(service, wall, 300 * MS)
+    assert 0 < driven.axes()[0].shaft < 3000
+
+    def fails(*_: object) -> None:
+        monkeypatch.undo()
+        raise RuntimeError("a fault of ours")
+
+    monkeypatch.setattr(driven, where, fails)
+    run(service, wall, 300 * MS)
+    if where in ("receive", "flush"):
+        getattr(service._loop._companion, where)(0)  # this board has no descriptors
+        run(service, wall, 300 * MS)
+    assert service.stopped.endswith("s: a fault of ours")
+    assert driven.axes()[0].standing.value == "fault"
+    assert Control(service).do("board", {})["boards"]["b"]["state"] == "shut down"  # type: ignore[index,call-overload]
