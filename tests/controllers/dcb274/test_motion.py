@@ -303,6 +303,16 @@ def test_decay_is_fast_above_the_threshold_and_slow_at_rest() -> None:
     assert bench.unit.drive(bench.now).slow_decay
 
 
+def test_page_36_decay_is_slow_while_a_motion_waits_for_its_current() -> None:
+    """ "When there is no motion (stopped), the decay will always be slow"; w is "a delay after turn on" (page 51)."""
+    bench = Bench()
+    bench.do("b 0", "w 50", "K 0 0")
+    bench.do("+20000", wait=100 * MS)
+    assert " s, 1/4" in bench.do("X", wait=10 * MS)
+    bench.run_to(bench.now + 500 * MS)
+    assert " f, 1/4" in bench.do("X", wait=10 * MS)
+
+
 def test_step_tables_have_four_full_steps_and_h_returns_to_the_start_phase() -> None:
     assert [len(table) for table in TABLES] == [32, 16, 8, 4, 8, 4]
     bench = Bench()
