@@ -304,6 +304,10 @@ def test_a_daisy_chain_gets_its_names_and_then_is_a_party_line() -> None:
     assert (a.moving(), b.moving()) == (False, True)
     b.stop()
     b.wait()
+    before = b.position()
+    port.write(b"B+55")  # a host that went away in the middle of a line
+    port.wait(0.1)
+    assert driven(port, "B", "daisy", "A")[0].position() == before
     b.abort()
     assert a.name_chain() == ("A", "B", "C")
     assert b.position() == 0

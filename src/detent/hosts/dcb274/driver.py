@@ -66,7 +66,7 @@ class Dcb274(Memory):
     def moving(self) -> Steps[bool]:
         """Whether the motor moves (^), or a program runs that this driver has started."""
         if self._way.running:
-            if not (yield from self._way.over()):
+            if not (yield from self._unbroken(self._way.over())):
                 return True
             self._way.running = False
         return bool((yield from self.moving_status()) & 3)
