@@ -124,6 +124,16 @@ def test_homing_by_the_switch_and_past_a_limit() -> None:
         lost.wait()
 
 
+@pytest.mark.parametrize("divisor", [37, 41, 42, 255])
+def test_home_is_searched_for_whatever_divides_the_speeds(divisor: int) -> None:
+    """Page 37: D divides all speeds, and 36 000 steps/s, of which the unit makes 41 480 (page 65), are the most."""
+    cell, unit = alone(SWITCHES)
+    unit.divide(divisor)
+    unit.home()
+    unit.wait(60)
+    assert cell.controllers()["unit"].status(cell.now).position == -199
+
+
 def test_speeds_are_those_of_the_motor_whatever_divides_them() -> None:
     cell, unit = alone()
     made = unit.set_speeds(Speeds(20, 2000, 1.0))

@@ -53,9 +53,9 @@ class Dcb274(Memory):
 
     @operation
     def home(self, direction: int = -1) -> Steps[None]:
-        """Begin the search for the home switch (F) at `home_rate`. The counter is not set."""
+        """Begin the search for the home switch (F) at `home_rate`, or as fast as D lets it. The counter is not set."""
         divide = yield from self._divisor()
-        yield from self.find_home(self.home_rate * divide, direction)
+        yield from self.find_home(commanded_rate(min(self.home_rate * divide, CEILING)), direction)
 
     @property
     def runs_a_program(self) -> bool:
