@@ -32,6 +32,11 @@ class PartyLine(Handshake):
         except NotListening as error:
             what = "is not on the line: is this its name, and is it in party line mode (strap PARTY, or ^P)?"
             raise NoAnswer(self.title, what, error.spoken, "party_line() sends ^P") from None
+        except NoAnswer as error:
+            if error.spoken is None or error.spoken.received != self.name.encode("latin-1"):
+                raise
+            what = "is there and takes no line: a program runs, a command waits, or it jogs"
+            raise NotListening(self.title, what, error.spoken, "stop() and halt() are taken") from None
         yield from self.takes_lines()
         return ""
 

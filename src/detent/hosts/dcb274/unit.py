@@ -138,6 +138,8 @@ class Unit(Axis):
         if len(text) > longest:
             behind = "behind the name " if longest != SingleMode.longest else ""
             raise ValueError(f"{text!r} has {len(text)} characters; a line has {longest} {behind}(pages 22 and 25)")
+        if self.mode == "sin10" and ";" in text:
+            raise ValueError(f"{text!r}: a SIN-10 takes ; for the end of a command (page 19); spool() takes several")
 
     def _enter(self, text: str, seconds: float, tries: int = TRIES) -> Steps[str]:
         """One line. If it breaks off, what stands in the line is not known: the next call clears it by connecting."""
