@@ -232,7 +232,7 @@ NAMED = {f"dcb-274 {mode}": lambda port, mode=mode: BlockingDcb274(Dcb274("A", m
 STOPPED_BY = {
     "gs-c200": (rb"Z|K", 5), "gs-c200s": (rb"Z|K", 5), "supersigma": (rb"\x01[\x06\x07]", 1.5),
     "dcb-274": (rb"@|\x1b", 6), "bs0610": (rb"XZ", 4), "dcb-274 party": (rb"A[@|]", 1.5),
-    "dcb-274 daisy": (rb"A[@|]\n", 2), "dcb-274 sin10": (rb"A[@|]\r", 1),
+    "dcb-274 daisy": (rb"A[@|]\n", 2), "dcb-274 sin10": (rb"A[@|]\r", 1.5),
 }  # fmt: skip
 """What stops an axis, with all that has to be said with it; seconds in which the call is over where nobody answers."""
 WAITS = {

@@ -35,11 +35,11 @@ def signed_on() -> Dcb274:
 
 
 def axis(name: str) -> Dcb274:
-    return ready(Dcb274(name, mode="party"), b"", name.encode(), b"\n")
+    return ready(Dcb274(name, mode="party"), b"", name.encode(), b"\n", name.encode(), b"X", b"  26\n")
 
 
 def known(name: str) -> Dcb274:
-    return ready(Dcb274(name, mode="sin10"), f"{name}^   0\r\n".encode())
+    return ready(Dcb274(name, mode="sin10"), f"{name}X  26\r\n".encode())
 
 
 NAMES = {

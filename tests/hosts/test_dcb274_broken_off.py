@@ -4,6 +4,7 @@ ESC would stop it too, but at once and without a ramp (page 33), and every other
 """
 
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import pytest
@@ -34,6 +35,8 @@ DOES: dict[str, Callable[[Dcb274], Steps[Any]]] = {
     "storing a program": lambda axis: axis.write_program(["+ 2000", "W 0"]),
 }
 
+SOME = ("a setting", "an index that waits", "storing a program")
+
 
 def in_program(unit: Any) -> None:
     unit.write_program(["+ 60000", "W 0"])
@@ -60,9 +63,19 @@ class Told(HostPort):
         return super().write(data)
 
 
+WAYS = {
+    "party": ('straps = { PARTY = "high" }\n', ""),
+    "daisy": ("", '[lines.ring]\nunits = ["unit"]\nkind = "daisy-chain"\n'),
+    "sin10": ("", '[units.adapter]\nmodel = "sin-10"\n[lines.host]\nunits = ["adapter"]\n'
+              '[lines.bus]\nunits = ["unit"]\nhost = "adapter"\n'),
+}  # fmt: skip
+"""Where lines have names: what more the unit has, and its cell."""
+
+
 def begun(moves: str, way: str = "") -> tuple[Cell, Told, Any]:
-    strap = 'straps = { PARTY = "high" }\n[units.unit.options]\nname = "X"\n' if way else ""
-    cell = build(parse(f'[units.unit]\nmodel = "dcb-274"\n{strap}', "cell"), lambda file: "", record=True)
+    strap, lines = WAYS.get(way, ("", ""))
+    name = '[units.unit.options]\nname = "X"\n' if way else ""
+    cell = build(parse(f'[units.unit]\nmodel = "dcb-274"\n{strap}{name}{lines}', "cell"), lambda file: "", record=True)
     port = Told(cell)
     unit = BlockingDcb274(Dcb274("X", mode=way) if way else Dcb274(), port)
     unit.connect()
@@ -107,13 +120,45 @@ def test_a_stop_that_breaks_something_off_ramps_down(moves: str, does: str) -> N
         ramps_down(moves, does, said=said, later=0.003)
 
 
+@pytest.mark.parametrize("does", SOME)
+@pytest.mark.parametrize("moves", MOVES)
+@pytest.mark.parametrize("way", WAYS)
+def test_so_does_one_where_lines_have_names(way: str, moves: str, does: str) -> None:
+    for said in (False, True):
+        ramps_down(moves, does, said=said, later=0.003, way=way)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("later", [0.0, 0.001, 0.01, 0.05, 0.4])
-@pytest.mark.parametrize("does", DOES)
+@pytest.mark.parametrize(("way", "does"), [*(("", does) for does in DOES), *product(WAYS, SOME)])
 @pytest.mark.parametrize("moves", MOVES)
-def test_a_stop_at_any_time_after_that_too(moves: str, does: str, later: float) -> None:
+def test_a_stop_at_any_time_after_that_too(way: str, moves: str, does: str, later: float) -> None:
     for said in (False, True):
-        ramps_down(moves, does, said=said, later=later)
+        ramps_down(moves, does, said=said, later=later, way=way)
+
+
+READS: dict[str, Callable[[Dcb274], Steps[Any]]] = {
+    "a listing": lambda axis: axis.listing(0),
+    "reports": lambda axis: axis.follow(0.2),
+    "a name": lambda axis: axis.store_name("X"),
+    "a look at the memory": lambda axis: axis.read_memory(0, 40),
+}
+
+
+@pytest.mark.parametrize("does", READS)
+def test_what_was_broken_off_takes_nothing_of_the_next_call(does: str) -> None:
+    """Half a line, a listing that waits for a key (page 48), ^N that waits for a name (page 57)."""
+    behind, over = 0, False
+    while not over:
+        _, port, unit = begun("rests")
+        over = broken_off(unit, port, READS[does](unit.driver), behind, said=False)
+        try:
+            assert unit.position() == 0
+        except DriverError:
+            assert does == "a name"  # SPACE, which is none, ends that
+            assert unit.position() == 0
+        assert unit.examine().name in "AX"
+        behind += 1
 
 
 @pytest.mark.parametrize("moves", ["rests", "runs"])

@@ -124,6 +124,16 @@ def test_homing_by_the_switch_and_past_a_limit() -> None:
         lost.wait()
 
 
+@pytest.mark.parametrize("divisor", [37, 41, 42, 255])
+def test_home_is_searched_for_whatever_divides_the_speeds(divisor: int) -> None:
+    """Page 37: D divides all speeds, and 36 000 steps/s, of which the unit makes 41 480 (page 65), are the most."""
+    cell, unit = alone(SWITCHES)
+    unit.divide(divisor)
+    unit.home()
+    unit.wait(60)
+    assert cell.controllers()["unit"].status(cell.now).position == -199
+
+
 def test_speeds_are_those_of_the_motor_whatever_divides_them() -> None:
     cell, unit = alone()
     made = unit.set_speeds(Speeds(20, 2000, 1.0))
@@ -304,6 +314,10 @@ def test_a_daisy_chain_gets_its_names_and_then_is_a_party_line() -> None:
     assert (a.moving(), b.moving()) == (False, True)
     b.stop()
     b.wait()
+    before = b.position()
+    port.write(b"B+55")  # a host that went away in the middle of a line
+    port.wait(0.1)
+    assert driven(port, "B", "daisy", "A")[0].position() == before
     b.abort()
     assert a.name_chain() == ("A", "B", "C")
     assert b.position() == 0

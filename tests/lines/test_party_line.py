@@ -1,5 +1,7 @@
 """Lines and adapters of several DCB-274s: bit times, collisions, daisy chain, SIN-8, SIN-10 (pages 16 to 26)."""
 
+import copy
+
 import pytest
 
 from detent.cell.build import build
@@ -209,3 +211,25 @@ def test_a_stop_for_one_axis_goes_through_while_the_adapter_waits() -> None:
     assert [adapted.controller(name).status(adapted.now).state for name in "XY"] == ["ready", "moving"]
     assert talk(adapted, b"XW 65535\r", 2) == b""
     assert talk(adapted, b"X@\r", 2) == b"XW 65535#\r\nX@\r\n"
+
+
+BEFORE_A_STOP = (
+    "X+5000", "XM 900", "XZ", "XS", "XC 0", "XC 1", "XW 500", "X[0 64;X[0 64", "XH 2", "9W*", "9WX", "YZ;YZ;YZ;YZ",
+    "YR 9000;9WY;XZ", "X^;X^", "X@@", "QZ", "YS", "YC 1", "Y[0 64;YZ", "YR 9000;YR 0",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("moves", ["X+60000", "XM 2000", "XG 300"])
+@pytest.mark.parametrize("before", BEFORE_A_STOP)
+def test_a_stop_is_heeded_whenever_it_comes_behind_whatever_command(moves: str, before: str) -> None:
+    """Page 57: | "may be used to individually ABORT a single axis". Page 29: S takes 60 ms, C 1 1500 ms."""
+    adapted = sin10()
+    talk(adapted, b"&\r", 3)
+    talk(adapted, f"XP 300;XM 2000;XL 2048 0;XP;{moves}\r".encode(), 0.5)
+    for stop in ("X@", "X|"):
+        for gap in (0, 5, 12, 19, 26, 40, 80):
+            at_it = copy.deepcopy(adapted)
+            talk(at_it, f"{before}\r".encode(), gap / 1000)
+            answer = talk(at_it, f"{stop}\r".encode(), 2.0 if before == "XC 1" else 0.6)
+            assert f"{stop}\r\n".encode() in answer, (stop, gap)
+            assert at_it.controller("X").status(at_it.now).state == "ready", (stop, gap)

@@ -19,6 +19,7 @@ BUFFER: Final = 256  # characters, each way
 NAMES: Final = bytes(value for value in range(0x21, 0x7F) if value not in b"[\\]^_`@")
 PATIENCE: Final[Ns] = 2 * MS  # for an echo, beside four characters
 EXECUTING: Final[Ns] = 20 * MS  # as long as most commands take (page 29 of the manual), and a stop waits for its echo
+LONGEST: Final[Ns] = 2_000 * MS  # as long as any command takes of which the end is to come: C 1, a long answer to [
 RESTART: Final[Ns] = 5 * MS  # from ^P to the scan
 LOST: Final = b"\0\r"  # stands in the buffer for what the line had beyond that: NUL is no name
 _ROOM: Final = 128  # characters that may wait for the host before another command begins
@@ -163,7 +164,7 @@ class Sin10(Adapter):
     stays until `&`, ^C or power-off: "selectable via host commands or a built in mode switch" (page 20).
     """
 
-    INSTANTS = instants(_timer=0, _begin_at=0)
+    INSTANTS = instants(_timer=0, _begin_at=0, _silent_since=EXECUTING)
 
     def __init__(
         self, baud: int = 9600, line_baud: int = 9600, party: bool = False, converter: bool = False, *,
@@ -189,6 +190,7 @@ class Sin10(Adapter):
         self._axes: deque[int] = deque()  # still to be scanned, or to be waited for
         self._command = ""  # that a wait answers
         self._timer: Ns = NEVER
+        self._silent_since: Ns = 0  # the line of the axes, behind the end of a command
         self._begin_at: Ns = NEVER  # when the host's line has room for another answer
 
     def power(self, on: bool, now: Ns) -> None:
@@ -310,11 +312,20 @@ class Sin10(Adapter):
         return self._task is not Task.NONE or self._lines > 0
 
     def _cut_in(self, now: Ns) -> None:
-        """A stop waits: nothing is under way, or a command waits in its axis; a poll is over soon."""
-        if self._stops and (self._task is Task.NONE or (self._task is Task.COMMAND and self._waits_for_axis)):
-            if self._task is Task.COMMAND:
-                self._held = self._task, bytes(self._reply)
-            self._exchange(Task.STOP, self._stops.popleft(), now)
+        """A stop waits: nothing is under way, or a command waits in its axis; a poll is over soon.
+
+        An answer that comes, perhaps of another axis, would collide with the echo: so the line is silent for a while.
+        """
+        if not self._stops or self._task not in (Task.NONE, Task.COMMAND):
+            return
+        if self._task is Task.COMMAND:
+            if not self._waits_for_axis:
+                return
+            if now < self._silent_since + EXECUTING:
+                self._timer = self._silent_since + EXECUTING
+                return
+            self._held = self._task, bytes(self._reply)
+        self._exchange(Task.STOP, self._stops.popleft(), now)
 
     @property
     def _waits_for_axis(self) -> bool:
@@ -376,21 +387,39 @@ class Sin10(Adapter):
         else:
             self._waiting = Waiting.END
             self._down.send(bytes((LF,)), now)
+            self._silent_since = max(now, self._down.busy_until)
+            self._cut_in(now)  # a stop may have come while the command was spelled
 
     def _wait_for_echo(self, now: Ns) -> None:
         characters = self.downstream_format.duration(4) if self._timed else 0
-        # the axis that is to stop may just execute what came before
-        self._timer = now + characters + (EXECUTING if self._task is Task.STOP else PATIENCE)
+        patience = PATIENCE
+        if self._task is Task.STOP:  # its axis may just execute what came before
+            patience = LONGEST if self._held_command else EXECUTING
+        self._timer = now + characters + patience
+
+    @property
+    def _held_command(self) -> bool:
+        """Whether a stop has come before the end of a command."""
+        return self._held is not None and self._held[0] is Task.COMMAND
+
+    @property
+    def _owed_first(self) -> bool:
+        """Whether what comes ends the command that a stop came before: so it does if one axis has both."""
+        if self._held is None or not self._held_command:
+            return False
+        return self._waiting is Waiting.ECHO or self._held[1][:1] == self._reply[:1]
 
     def _from_axis(self, value: int, now: Ns) -> None:
         if self._waiting is Waiting.ECHO and value == self._expected:
             self._timer = NEVER
             self._reply.append(value)
             self._send_next(now)
-        elif self._held is not None and self._held[0] is Task.COMMAND:  # the end of the command that is stopped
+        elif self._held is not None and self._owed_first:
             if value == LF:
                 self._up.send(self._held[1] + b"\r\n", now)
                 self._held = None
+                if self._waiting is Waiting.ECHO:
+                    self._wait_for_echo(now)
             else:
                 self._held = self._held[0], self._held[1] + bytes((value,))
         elif self._waiting is Waiting.END:
@@ -399,10 +428,15 @@ class Sin10(Adapter):
                 self._done(now)
             else:
                 self._reply.append(value)
+                self._silent_since = now
+                if self._task is Task.COMMAND:
+                    self._cut_in(now)
 
     def _no_echo(self, now: Ns) -> None:
-        """Patience is over: with an echo, or with the end of a broken line; or ^P or ESC has been obeyed."""
-        if self._task is Task.RESTART:
+        """Patience is over: with an echo, the end of a broken line, an answer; or ^P or ESC has been obeyed."""
+        if self._task is Task.COMMAND and self._waits_for_axis:
+            self._cut_in(now)
+        elif self._task is Task.RESTART:
             self._down.send(bytes((LF,)), now)
             self._scan(now)
         elif self._task is Task.ABORT:
@@ -453,9 +487,10 @@ class Sin10(Adapter):
             self._look(now)
         elif held[0] is Task.POLL:
             self._poll(now)
-        else:  # the axis did not take the stop, and still owes the end of its command
+        else:  # another axis, or one that did not take the stop, still owes the end of its command
             self._task, self._waiting, self._silent = Task.COMMAND, Waiting.END, False
             self._reply = bytearray(held[1])
+            self._cut_in(now)
 
     def _scan(self, now: Ns) -> None:
         if self._axes:

@@ -91,6 +91,31 @@ def test_soft_stop_between_two_m_waits_for_the_first_ramp() -> None:
     assert len(bench.of(MotionStarted)) == 2
 
 
+@pytest.mark.parametrize("routine", [False, True])
+@pytest.mark.parametrize("stop", ["@", "SS"])
+def test_page_28_nor_does_a_stop_between_two_m_of_a_program_cut_the_first_ramp(stop: str, routine: bool) -> None:
+    """ "During PENDING PERIODS that are a result of multiple Constant Velocity commands (inter-speed ramping),
+    deceleration will be delayed until the previous ramp-to-speed has been completed." G is "a continuous pending
+    (Instructions Queued) period" (page 27); a trip that is served meanwhile does not end it."""
+    bench = Bench()
+    bench.do("K 50 50", "P 100", "A 8", "W 20", "P", "P 0", *(["T 20 100"] if routine else []), "M 5000", "M 2000", "P")
+    bench.say("G\r")
+    while not bench.of(MotionStarted):
+        bench.run_to(bench.now + MS)
+    bench.run_to(bench.now + 40 * MS)
+    assert bench.unit._ports.port(4) is routine
+    if stop == "@":
+        bench.say("@")
+    else:
+        bench.pin("SS", 0)
+    first = bench.of(MotionStarted)[0]
+    bench.run_to(bench.now + 5 * SECOND)
+    stopped = bench.of(MotionStarted)[1]
+    assert (stopped.first, stopped.at) == (50 * 21 + 1, first.train.time_of(50 * 21))
+    assert len(bench.of(MotionStarted)) == 2
+    assert bench.unit.status(bench.now).state == "ready"
+
+
 def test_a_limit_cuts_at_its_instant_and_esc_as_well() -> None:
     bench = Bench()
     bench.do("M 3000", wait=SECOND)
@@ -276,6 +301,16 @@ def test_decay_is_fast_above_the_threshold_and_slow_at_rest() -> None:
     assert ", f," in bench.do("X", wait=MS)
     bench.do("b 255", wait=MS)
     assert bench.unit.drive(bench.now).slow_decay
+
+
+def test_page_36_decay_is_slow_while_a_motion_waits_for_its_current() -> None:
+    """ "When there is no motion (stopped), the decay will always be slow"; w is "a delay after turn on" (page 51)."""
+    bench = Bench()
+    bench.do("b 0", "w 50", "K 0 0")
+    bench.do("+20000", wait=100 * MS)
+    assert " s, 1/4" in bench.do("X", wait=10 * MS)
+    bench.run_to(bench.now + 500 * MS)
+    assert " f, 1/4" in bench.do("X", wait=10 * MS)
 
 
 def test_step_tables_have_four_full_steps_and_h_returns_to_the_start_phase() -> None:

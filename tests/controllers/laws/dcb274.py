@@ -110,7 +110,8 @@ def at_once(bench: Bench) -> Ns:
 
 
 def soft_or_pending(bench: Bench) -> Ns:
-    return soft_behind_a_ramp(bench) if pending(bench) else soft(bench)
+    waits = pending(bench) or bench.device._running._speeds_pending  # type: ignore[attr-defined]
+    return soft_behind_a_ramp(bench) if waits else soft(bench)
 
 
 class Axis:

@@ -67,8 +67,8 @@ def threshold(decay: int, resolution: int) -> int:
 
 
 def slow_decay(motion: Motion, registers: Settings, now: Ns) -> bool:
-    """Whether decay is slow: always at rest and with b 255, below the threshold otherwise; 0 is fast."""
-    if registers.decay == _ALWAYS_SLOW:
+    """Whether decay is slow: always at rest (w is, too) and with b 255, else below the threshold; 0 is fast."""
+    if registers.decay == _ALWAYS_SLOW or motion.energizing(now):
         return True
     period = TICK * motion.period(now) or _external(motion, now)
     return period >= NEVER or threshold(registers.decay, registers.resolution) * period > SECOND

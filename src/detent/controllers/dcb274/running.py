@@ -85,10 +85,23 @@ class Running:
         self._fetch(now)
 
     def soft_stop(self, now: Ns) -> None:
-        """@ or the soft stop input: decelerate, then the program is over."""
-        self._work.motion.soft_stop(now)
+        """@ or the soft stop input: decelerate, then the program is over.
+
+        Where an M waits for the ramp of the M before it, that ramp is completed first (page 28).
+        """
+        if self._speeds_pending:
+            self._work.motion.soft_stop_after_ramp(now)
+        else:
+            self._work.motion.soft_stop(now)
         self.stage, self.timer = Stage.LAST, NEVER
         self._stopping, self._saved, self._called = True, None, 0
+
+    @property
+    def _speeds_pending(self) -> bool:
+        """Whether an M is held; also while a trip routine is served in that wait."""
+        held = self if self._saved is None else self._saved
+        instruction = self._instruction if self._saved is None else self._saved.instruction
+        return held.stage is Stage.HELD and instruction is not None and instruction.op is Op.VELOCITY
 
     def trip(self, vector: int, now: Ns) -> None:
         """The trip position is reached: call the routine, between two instructions or in a wait (page 49).

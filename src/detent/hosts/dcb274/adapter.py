@@ -2,10 +2,10 @@
 
 from typing import Final
 
-from detent.hosts.dcb274.handshake import CR, ESC, NAMED_LONGEST, TRIES, Handshake, NotListening
+from detent.hosts.dcb274.handshake import CR, ESC, NAMED_LONGEST, TRIES, Handshake, NotKnown, NotListening
 from detent.hosts.dcb274.names import ADAPTERS_OWN, is_name
-from detent.hosts.errors import BadAnswer, DriverError, NoAnswer, Refused, Spoken
-from detent.hosts.exchange import Clear, Steps, attempt, until
+from detent.hosts.errors import ECHOES, BadAnswer, DriverError, NoAnswer, Spoken
+from detent.hosts.exchange import Ask, Clear, Steps, attempt, until
 
 ADAPTER_LONGEST: Final = 256  # characters of a line of commands (page 19)
 SCAN: Final = 10.0  # seconds for `&`: 86 names, each with a time-out of the adapter's own
@@ -21,11 +21,11 @@ class Adapter(Handshake):
     longest = NAMED_LONGEST
 
     def connect(self) -> Steps[str]:
-        """Ask the axis how it moves. If the adapter knows no axis yet, look for axes."""
+        """Ask the axis what it is (X, page 52). If the adapter knows no axis yet, look for axes."""
         yield Clear()
         try:
-            yield from self.line("^", 0.0)
-        except Refused as error:
+            yield from self.takes_lines()
+        except NotKnown as error:
             known = yield from self.known()
             if known:
                 what = f"is not known to the adapter, which knows {', '.join(known)}; & looks anew, and resets all"
@@ -40,7 +40,7 @@ class Adapter(Handshake):
         names = [chr(value) for value in range(0x21, 0x7F) if is_name(chr(value)) and chr(value) not in ADAPTERS_OWN]
         known = ""
         for half in (names[::2], names[1::2]):
-            replies = yield from self.spool([f"{name}^" for name in half], SCAN)
+            replies = yield from self.spool([f"{name}X" for name in half], SCAN)
             known += "".join(name for name, reply in zip(half, replies, strict=True) if reply != "#")
         return "".join(sorted(known))
 
@@ -55,12 +55,37 @@ class Adapter(Handshake):
 
     def line(self, text: str, seconds: float, tries: int = TRIES) -> Steps[str]:
         """The command behind its name; the reply has it again, and the result behind."""
+        return (yield from self._exchange(text, seconds, (b"#", b"?")))
+
+    def _exchange(self, text: str, seconds: float, short: tuple[bytes, ...]) -> Steps[str]:
+        """The same; `short` are replies that need not have it. Those to what was broken off before are passed over."""
         yield Clear()
-        (reply,) = yield from self.spool([self.name + text], seconds)
+        said = (self.name + text).encode("latin-1")
+
+        def complete(came: bytes) -> int | None:
+            end = 0
+            for line in came.split(b"\r\n")[:-1]:
+                end += len(line) + 2
+                line = line.lstrip(b"\n")  # of a reply of which the CR has been cleared
+                if line.startswith(said) or line in short:
+                    return end
+            return None
+
+        answer = yield Ask(said + CR, complete, 2 * self.patience + seconds)
+        lines = answer.data.decode("latin-1").split("\r\n")[:-1]
+        if not lines:
+            spoken = Spoken(said + CR, answer.data)
+            if spoken.echoed:
+                raise BadAnswer(self.title, ECHOES, spoken)
+            what = "does not finish its answer" if answer.data else "does not answer"
+            raise NoAnswer(self.title, f"{what} within {2 * self.patience + seconds:.3g} s", spoken)
+        return self._result(text, lines[-1].lstrip("\n"))
+
+    def _result(self, text: str, reply: str) -> str:
         spoken = Spoken((self.name + text + "\r").encode("latin-1"), (reply + "\r\n").encode("latin-1"))
         if reply == "#":
             what = "is not known to the adapter; & looks for axes, and resets all"
-            raise Refused(self.title, what, spoken, "#", "scan() sends &")
+            raise NotKnown(self.title, what, spoken, "#", "scan() sends &")
         if reply == "?":
             raise NotListening(self.title, "takes no line: a program runs, it jogs, or it is gone", spoken)
         if reply.endswith("?"):
@@ -93,12 +118,15 @@ class Adapter(Handshake):
 
         An adapter that knows no such axis looks for axes first, which resets them (page 19).
         """
-        refused = yield from attempt(self.line(character.decode("latin-1"), 0.0))
-        if isinstance(refused, Refused) and not known:
+        stop = character.decode("latin-1")
+        told = yield from attempt(self._exchange(stop, 0.0, (b"#", b"?") if known else ()))
+        if isinstance(told, NotKnown) and not known:
             yield from self.connect()
-            yield from self.line(character.decode("latin-1"), 0.0)
-        elif isinstance(refused, DriverError):
-            raise refused
+            yield from self.line(stop, 0.0)
+        elif isinstance(told, DriverError):
+            raise told
+        if not known and (yield from self.end_program_mode()):
+            yield from self.line(stop, 0.0)
 
     def over(self) -> Steps[bool]:
         """Whether it says how it moves."""

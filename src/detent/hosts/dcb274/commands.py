@@ -53,11 +53,15 @@ class Commands(Unit):
         if not isinstance(self._way, SingleMode):
             raise ValueError("continuous reports are for single mode only (page 53): ask for position()")
         first = yield from self._number("Z1")
-        answer = yield Ask(b"", lambda came: None, seconds)
-        last = yield from self._way.reports_off()
-        reports = [*answer.data.decode("latin-1").split("\r"), *last.split("\r")]
+        reports = yield from self._unbroken(self._reports(self._way, seconds))
         positions = [int(report) for report in reports if report.strip().lstrip("-").isdigit()]
         return [first, *positions]
+
+    def _reports(self, way: SingleMode, seconds: float) -> Steps[list[str]]:
+        """What comes for so long; then none come any more."""
+        answer = yield Ask(b"", lambda came: None, seconds)
+        last = yield from way.reports_off()
+        return [*answer.data.decode("latin-1").split("\r"), *last.split("\r")]
 
     @operation
     def moving_status(self) -> Steps[int]:
@@ -278,7 +282,7 @@ class Commands(Unit):
             raise ValueError("programs print in single mode only: go(), wait()")
         yield from self._start(address, trace=True)
         waited = 0.0
-        while waited < seconds and not (yield from self._way.over()):
+        while waited < seconds and not (yield from self._unbroken(self._way.over())):
             yield Rest(self.poll)
             waited += self.poll + self._way.patience
         self._way.running = waited >= seconds
@@ -326,9 +330,11 @@ class Commands(Unit):
         if isinstance(self._way, SingleMode):
             yield from self._stop_alone(self._way)
             return
-        if self._connected and (self._storing or self.programming):
-            yield from self._leave_program_mode()
-        yield from self._way.interrupt(letter.encode(), known=self._connected)
+        stores = self._storing or self.programming
+        if self._connected and stores:
+            yield from self._way.end_program_mode()
+        yield from self._way.interrupt(letter.encode(), known=self._connected and not stores)
+        self._takes_lines()
 
     def _stop_alone(self, way: SingleMode) -> Steps[None]:
         known = self._connected and not self._storing and not self.programming
@@ -340,13 +346,8 @@ class Commands(Unit):
         except DriverError:  # it may be off: whoever comes next sees whether it signs on
             self._connected = False
             raise
-        way.running = self._storing = self.programming = False
-
-    def _leave_program_mode(self) -> Steps[None]:
-        """Where lines are stored nothing is told about the motion; P ends that (page 47)."""
-        if not (yield from self._line("^", typed=True)).strip():
-            yield from self._line("P", SAVING, typed=True)
-        self._storing = self.programming = False
+        way.running = False
+        self._takes_lines()
 
     @operation
     def abort(self) -> Steps[None]:
@@ -358,4 +359,5 @@ class Commands(Unit):
         except DriverError:  # it may be off
             self._connected = False
             raise
-        self._way.running = self.programming = False
+        self._way.running = False
+        self._takes_lines()

@@ -53,9 +53,9 @@ class Dcb274(Memory):
 
     @operation
     def home(self, direction: int = -1) -> Steps[None]:
-        """Begin the search for the home switch (F) at `home_rate`. The counter is not set."""
+        """Begin the search for the home switch (F) at `home_rate`, or as fast as D lets it. The counter is not set."""
         divide = yield from self._divisor()
-        yield from self.find_home(self.home_rate * divide, direction)
+        yield from self.find_home(commanded_rate(min(self.home_rate * divide, CEILING)), direction)
 
     @property
     def runs_a_program(self) -> bool:
@@ -66,7 +66,7 @@ class Dcb274(Memory):
     def moving(self) -> Steps[bool]:
         """Whether the motor moves (^), or a program runs that this driver has started."""
         if self._way.running:
-            if not (yield from self._way.over()):
+            if not (yield from self._unbroken(self._way.over())):
                 return True
             self._way.running = False
         return bool((yield from self.moving_status()) & 3)

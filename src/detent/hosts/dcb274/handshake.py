@@ -9,7 +9,7 @@ before the line is complete: the line is taken back and entered again, so nobody
 from typing import Final
 
 from detent.hosts.errors import NoAnswer, Refused, Spoken
-from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps, length
+from detent.hosts.exchange import Ask, Clear, Driver, Pause, Steps, attempt, length
 
 BS, LF, CR, SPACE, ESC = b"\x08", b"\n", b"\r", b" ", b"\x1b"
 CTRL_C, CTRL_N, CTRL_P = b"\x03", b"\x0e", b"\x10"
@@ -22,21 +22,29 @@ RESTART: Final = 0.1  # seconds that a unit may take from ^C or ^P until it list
 RESET: Final = "was switched off and on, or reset: it is at 0, with the settings of its NV memory"
 
 
+IN_PROGRAM_MODE: Final = "is in program mode, where lines are stored: P ends it, and so does ESC"
+
+
 class NotListening(NoAnswer):
     """Not even the first character is echoed: a program runs, a command waits, the axis jogs, or nobody is there."""
+
+
+class NotKnown(Refused):
+    """An adapter knows no such axis: that is its own answer."""
 
 
 class Handshake(Driver):
     """One way to bring lines to one unit. `patience`: seconds for an echo. `running`: a program is known to run.
 
-    `longest` is how many characters fit into a line, behind the name where there is one.
+    `longest` is how many characters fit into a line, behind the name where there is one. `programming`: the unit was
+    found storing what it is sent, as somebody has begun a program (page 47).
     """
 
     longest: int = SINGLE_LONGEST
 
     def __init__(self, name: str, patience: float) -> None:
         self.name, self.patience = name, patience
-        self.running = False
+        self.running = self.programming = False
         self.title = f"DCB-274 {name}".rstrip()
 
     def connect(self) -> Steps[str]:
@@ -66,7 +74,8 @@ class Handshake(Driver):
         """Send ``@`` or ``|``, where lines have names: also a unit that runs a program takes it (page 28).
 
         For the unit that runs nothing it is a line like any other, and means the same. It is on the line before
-        anything is waited for that may not come. `known`: no part of another line stands before it.
+        anything is waited for that may not come. `known`: no part of another line stands before it, and lines are not
+        stored; otherwise it is seen behind it whether they are, and then program mode is ended and it is sent again.
         """
         raise NotImplementedError
         yield
@@ -80,6 +89,36 @@ class Handshake(Driver):
         """ESC: every axis on the line stops at once and ends its program (page 33). It answers ``#``."""
         raise NotImplementedError
         yield
+
+    def takes_lines(self) -> Steps[str]:
+        """What X says. In program mode it is refused, and not stored as other looks are: raises Refused then.
+
+        Raises NotKnown, NoAnswer, BadAnswer as well.
+        """
+        self.programming = False
+        try:
+            return (yield from self.line("X", 0.0))
+        except NotKnown:
+            raise
+        except Refused as error:
+            self.programming = True
+            raise Refused(self.title, IN_PROGRAM_MODE, error.spoken, "#", 'command("P") sends P') from None
+
+    def stores_lines(self) -> Steps[bool]:
+        """Whether X is refused, and again: the first may have stood behind something. P where none are begins that."""
+        for _ in range(2):
+            told = yield from attempt(self.line("X", 0.0))
+            if not isinstance(told, Refused) or isinstance(told, NotKnown):
+                return False
+        return True
+
+    def end_program_mode(self) -> Steps[bool]:
+        """P, if lines are stored (page 47); whether they were. An empty line is taken."""
+        stores = yield from self.stores_lines()
+        if stores:
+            yield from attempt(self.line("P", STORED))
+        self.programming = False
+        return stores
 
     def restart(self, character: bytes) -> Steps[None]:
         """^C or ^P: every axis on the line is reset."""

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from detent.hosts.dcb274.answers import Listed, Listing
 from detent.hosts.dcb274.commands import CELLS_AT_ONCE, Commands
-from detent.hosts.dcb274.handshake import CR
+from detent.hosts.dcb274.handshake import CR, SINGLE_LONGEST
 from detent.hosts.dcb274.programs import END, NO_PROGRAM, SHADOW, SIZE, behind, holds, led_to, left_over
 from detent.hosts.dcb274.ranges import LARGEST_ADDRESS, between, program_address
 from detent.hosts.dcb274.single_mode import SingleMode
@@ -59,21 +59,26 @@ class Memory(Commands):
             yield from self.connect()
         if self._way.running:
             yield from self._see_it_over()
-        yield from self._way.enter(text)
-        lines: list[str] = []
-        while not lines or not lines[-1].isdigit():
-            answer = yield Ask(CR, _page, self._way.patience + 1.0)
-            spoken = Spoken((text if not lines else "").encode() + CR, answer.data)
-            if answer.data == b"#\r\n":
-                raise self._way.refused(text, spoken)
-            if not answer.whole:
-                self._connected = False
-                raise BadAnswer(self.title, f"does not finish its listing from {address} on", spoken)
-            lines += _printed(answer.data)
+        lines = yield from self._unbroken(self._lines(self._way, text, address))
         try:
             return Listing.parse(lines)
         except ValueError:
             raise BadAnswer(self.title, f"lists {lines!r} from {address} on") from None
+
+    def _lines(self, way: SingleMode, text: str, address: int) -> Steps[list[str]]:
+        """What `text` lists, to the bare end address."""
+        yield from way.enter(text)
+        lines: list[str] = []
+        while not lines or not lines[-1].isdigit():
+            answer = yield Ask(CR, _page, way.patience + 1.0)
+            spoken = Spoken((text if not lines else "").encode() + CR, answer.data)
+            if answer.data == b"#\r\n":
+                raise way.refused(text, spoken)
+            if not answer.whole:
+                self._connected = False
+                raise BadAnswer(self.title, f"does not finish its listing from {address} on", spoken)
+            lines += _printed(answer.data)
+        return lines
 
     @operation
     def read_program(self, address: int | None = None) -> Steps[list[str]]:
@@ -125,7 +130,7 @@ class Memory(Commands):
         instruction may say where it stands itself, so that a listing can be written back. An end mark follows each
         block. Where lines have names, only the end marks can be seen. Raises ValueError before anything is written.
         """
-        blocks = blocks_of(lines, address)
+        blocks = blocks_of(lines, address, self._way.longest)
         stored: list[Listed] = []
         total = sum(len(block.texts) for block in blocks)
         for block in blocks:
@@ -138,21 +143,21 @@ class Memory(Commands):
     def _store(self, block: Block, done: int, total: int) -> Steps[list[Listed]]:
         stored: list[Listed] = []
         address = block.address
-        self._storing = True
         yield from self._line(f"P{address}")
+        self._storing = True
         try:
             for text in block.texts:
                 yield Progress(done + len(stored), total, f"storing {text}")
-                yield from self._line(text, _STORING)
+                yield from self._line(text, _STORING, typed=True)
                 stored.append(Listed(address, text))
                 address += LENGTHS[text[0]]
         except Refused as error:
             # ESC would leave the rest of an older program behind the new instructions, and stop every axis.
-            yield from self._line("P", _STORING)
+            yield from self._line("P", _STORING, typed=True)
             self._storing = False
             what = f"{error.what}; new instructions stand at {block.address} to {address - 1}, an end mark at {address}"
             raise Refused(self.title, what, error.spoken, error.code) from None
-        yield from self._line("P", _STORING)
+        yield from self._line("P", _STORING, typed=True)
         self._storing = False
         return stored
 
@@ -247,8 +252,11 @@ class Memory(Commands):
         return bytes(memory)
 
 
-def blocks_of(lines: Sequence[str], address: int = 0) -> list[Block]:
-    """What `write_program` is given, checked as far as this side can. Raises ValueError that names the line."""
+def blocks_of(lines: Sequence[str], address: int = 0, longest: int = SINGLE_LONGEST) -> list[Block]:
+    """What `write_program` is given, as it is typed where a line has `longest` characters.
+
+    It is checked as far as this side can. Raises ValueError that names the line.
+    """
     blocks = [Block(program_address(address), [])]
     for number, raw in enumerate(lines, 1):
         text = raw.strip()
@@ -269,8 +277,7 @@ def blocks_of(lines: Sequence[str], address: int = 0) -> list[Block]:
             blocks.append(Block(address, []))
         if text[0] not in LENGTHS:
             raise ValueError(f"line {number}: {text!r} cannot stand in a program")
-        if len(text) > SingleMode.longest:
-            raise ValueError(f"line {number}: {text!r} is longer than the {SingleMode.longest} characters of a line")
+        text = _as_typed(text, number, longest)
         blocks[-1].texts.append(text)
         for place in range(address, address + LENGTHS[text[0]]):
             if place in NO_PROGRAM or place >= SIZE:
@@ -284,6 +291,20 @@ def blocks_of(lines: Sequence[str], address: int = 0) -> list[Block]:
             raise ValueError(f"the block at {block.address}, with its end mark, reaches into one before; move it")
         taken.update(places[:-1])
     return blocks
+
+
+def _as_typed(text: str, line: int, longest: int) -> str:
+    """An instruction as it goes over the line; without the blank behind its letter if it is too long with it."""
+    text = text.rstrip("; ")
+    if not (text.isascii() and text.isprintable()):
+        raise ValueError(f"line {line}: {text!r} has a character that cannot be typed")
+    if ";" in text:
+        raise ValueError(f"line {line}: {text!r} is more than one instruction")
+    short = text if len(text) <= longest else text[0] + text[1:].lstrip()
+    if len(short) > longest:
+        behind = " behind the name" if longest < SINGLE_LONGEST else ""
+        raise ValueError(f"line {line}: {text!r} is longer than the {longest} characters{behind} of a line")
+    return short
 
 
 def hex_lines(memory: bytes) -> list[str]:

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from detent.hosts.dcb274.handshake import ESC, LF, NAMED_LONGEST, STORED, TRIES, Handshake, NotListening
+from detent.hosts.dcb274.handshake import ESC, LF, NAMED_LONGEST, TRIES, Handshake, NotListening
 from detent.hosts.dcb274.names import next_name
 from detent.hosts.errors import BadAnswer, DriverError, NoAnswer, Spoken
 from detent.hosts.exchange import Ask, Clear, Pause, Steps, attempt, length, until
@@ -20,7 +20,7 @@ class PartyLine(Handshake):
     longest = NAMED_LONGEST
 
     def connect(self) -> Steps[str]:
-        """Spoil whatever stands in the line, then ask whether the axis is there (page 26).
+        """Spoil whatever stands in the line, then ask whether the axis is there (page 26), and takes lines.
 
         A unit that waits for its sign-on takes that for the start of a daisy chain (page 23): it has this name until it
         is reset, and talks just so.
@@ -32,6 +32,12 @@ class PartyLine(Handshake):
         except NotListening as error:
             what = "is not on the line: is this its name, and is it in party line mode (strap PARTY, or ^P)?"
             raise NoAnswer(self.title, what, error.spoken, "party_line() sends ^P") from None
+        except NoAnswer as error:
+            if error.spoken is None or error.spoken.received != self.name.encode("latin-1"):
+                raise
+            what = "is there and takes no line: a program runs, a command waits, or it jogs"
+            raise NotListening(self.title, what, error.spoken, "stop() and halt() are taken") from None
+        yield from self.takes_lines()
         return ""
 
     def line(self, text: str, seconds: float, tries: int = TRIES) -> Steps[str]:
@@ -88,19 +94,13 @@ class PartyLine(Handshake):
             yield from self.enter(character.decode("latin-1"), TRIES - 1)
             if not heard:
                 yield from self.ask(LF, until(b"\n"), self.patience)
-                yield from self._end_program_mode()
+                yield from self.end_program_mode()
                 yield from self.enter(character.decode("latin-1"), TRIES - 1)
         ended = yield from self.ask(LF, until(b"\n"), self.patience)
         if ended.startswith(b"#"):
             yield from self.ask(b"", until(b"\n"), self.patience)
-
-    def _end_program_mode(self) -> Steps[None]:
-        """P, if it does not say how it moves, and again: lines are stored then (page 47). A bit makes P of @."""
-        for _ in range(2):
-            told = yield from attempt(self.line("^", 0.0))
-            if not isinstance(told, str) or told.strip():
-                return
-        yield from attempt(self.line("P", STORED))
+        if not known and (yield from self.end_program_mode()):
+            yield from self.interrupt(character, known=True)
 
     def over(self) -> Steps[bool]:
         """Whether it says how it moves."""
@@ -129,16 +129,17 @@ class DaisyChain(PartyLine):
         self.names: tuple[str, ...] = ()  # that this driver has given
 
     def connect(self) -> Steps[str]:
-        """Give names if nobody has done so since the last reset, then ask the axis how it moves."""
+        """Give names if nobody has done so since the last reset, then ask the axis what it is (X, page 52)."""
         yield from self._have_names()
-        if not (yield from self.line("^", 0.0)):
+        if not (yield from self.takes_lines()):
             what = f"is not in the chain, whose first axis is {self.first}"
-            raise NoAnswer(self.title, what, Spoken(self.name.encode() + b"^\n", self.name.encode() + b"^\n"))
+            raise NoAnswer(self.title, what, Spoken(self.name.encode() + b"X\n", self.name.encode() + b"X\n"))
         return ""
 
     def _have_names(self) -> Steps[None]:
+        """Half a line that stands in an axis is spoilt; to one that has no name these characters are none (page 23)."""
         yield Clear()
-        passed = yield Ask(LF, until(b"\n"), self.patience)
+        passed = yield Ask(SPOIL + LF, until(b"\n"), self.patience)
         if not passed.whole:
             yield from self.assign()
 
@@ -168,6 +169,8 @@ class DaisyChain(PartyLine):
             raise missing
         if isinstance(told, DriverError):
             raise told
+        if not known and (yield from self.end_program_mode()):
+            yield from super().interrupt(character, known=True)
 
     def escape(self) -> Steps[None]:
         """ESC goes round, and every axis answers it."""

@@ -8,10 +8,10 @@ from detent.hosts.dcb274.handshake import (
     CR,
     CTRL_C,
     ESC,
+    IN_PROGRAM_MODE,
     RESET,
     SINGLE_LONGEST,
     SPACE,
-    STORED,
     TRIES,
     Handshake,
     NotListening,
@@ -26,8 +26,7 @@ SOON: Final = 6  # of them where something else comes, as no unit ramps down so,
 class SingleMode(Handshake):
     """One axis on the line, signed on with SPACE. Characters are echoed, CR is not; the answer ends in CR LF.
 
-    `printed` are the lines that programs have printed and nobody has taken yet, `examined` what X said at sign-on,
-    `programming` whether the unit was found storing what it is sent: somebody has begun a program (page 47).
+    `printed` are the lines that programs have printed and nobody has taken yet, `examined` what X said at sign-on.
     """
 
     def __init__(self, patience: float) -> None:
@@ -35,7 +34,6 @@ class SingleMode(Handshake):
         self.printed: list[str] = []
         self._begun = ""  # of a line that a program is printing
         self.examined = ""
-        self.programming = False
         self._typed = False  # a line went unanswered
 
     def connect(self) -> Steps[str]:
@@ -60,9 +58,8 @@ class SingleMode(Handshake):
             yield from self._erase()
         self.examined = yield from self._among_reports("X")
         if self.examined == "#":
-            what = "is in program mode, where lines are stored: P ends it, and so does ESC"
             self.programming = True
-            raise Refused(self.title, what, Spoken(b"X\r", b"X#\r\n"), "#", "abort() sends ESC")
+            raise Refused(self.title, IN_PROGRAM_MODE, Spoken(b"X\r", b"X#\r\n"), "#", "abort() sends ESC")
         self.programming = False
         yield from self.reports_off()
         return version.group().decode() if version else ""
@@ -147,14 +144,14 @@ class SingleMode(Handshake):
                 continue
             if not known:
                 yield from self._erase(SINGLE_LONGEST + 1)
-                yield from self._end_program_mode()
+                yield from self.end_program_mode()
                 yield Clear()
                 answer = yield Ask(b"@", length(1), self.patience)
                 if answer.data != b"@":
                     heard, wrong = answer.data, wrong + 1
                     continue
             answer = yield Ask(CR, until(b"\r\n"), self.patience)
-            if answer.data == b"\r\n" and (sure or not (yield from self._stores_lines())):
+            if answer.data == b"\r\n" and (sure or not (yield from self.stores_lines())):
                 return
             if answer.data == CR:  # which no unit echoes
                 raise BadAnswer(self.title, ECHOES, Spoken(b"@\r", b"@\r"))
@@ -170,13 +167,8 @@ class SingleMode(Handshake):
         what = "does not take its stop command: it is off, the line is broken, or it ramps down out of a program"
         raise NoAnswer(self.title, what, spoken, "abort() sends ESC")
 
-    def _end_program_mode(self) -> Steps[None]:
-        """P, if lines are stored (page 47). An empty line is taken."""
-        if (yield from self._stores_lines()):
-            yield from attempt(self.line("P", STORED))
-
-    def _stores_lines(self) -> Steps[bool]:
-        """Whether X is refused, and again: the first may have stood behind something. P where none are begins that."""
+    def stores_lines(self) -> Steps[bool]:
+        """As everywhere; continuous reports (Z 1) may come in between."""
         for _ in range(2):
             told = yield from attempt(self._among_reports("X"))
             if told != "#":

@@ -1,7 +1,7 @@
 """One DCB-274 on its line: signing on, lines to it, its turn for an action, resets, names, what a SIN-10 does."""
 
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, TypeVar
 
 from detent.hosts.axis import Axis
 from detent.hosts.dcb274.adapter import Adapter
@@ -19,6 +19,8 @@ PATIENCE: Final = 0.25  # seconds for an echo; a character takes 1 ms at 9600 ba
 REST, INDEXING, CONSTANT = 0, 1, 3  # what ^ answers
 # Seconds that commands execute (page 29), twice as long as it says; the others take less than a millisecond.
 SAVING, CLEARING, QUICK, INDEX = 0.12, 3.0, 0.02, 0.02
+
+T = TypeVar("T")
 
 
 class Unit(Axis):
@@ -70,7 +72,11 @@ class Unit(Axis):
     @property
     def in_program_mode(self) -> bool:
         """Whether lines are stored, as far as is known: `command` has begun that, or it was found so (page 47)."""
-        return self.programming or (isinstance(self._way, SingleMode) and self._way.programming)
+        return self.programming or self._way.programming
+
+    def _takes_lines(self) -> None:
+        """It is in no program mode."""
+        self._storing = self.programming = self._way.programming = False
 
     # -- the line ----------------------------------------------------------------------------------------
 
@@ -91,8 +97,8 @@ class Unit(Axis):
         self.version = version or self.version
         self._cut_short = bool(version) and (self._target is not None or self._search != 0)
         self._connected, self._broken = True, False
+        self._takes_lines()  # X was answered
         if isinstance(self._way, SingleMode):
-            self._storing = self.programming = False  # X was answered
             self.name = self._settings(self._way.examined).name
             self.title = self._way.title = f"DCB-274 {self.name}"
         return self.version
@@ -109,7 +115,7 @@ class Unit(Axis):
             try:
                 yield from self.connect()
             except Refused:
-                if not (isinstance(self._way, SingleMode) and self._way.programming):
+                if not self._way.programming:
                     raise
                 return (yield from self._enter(text, seconds))
         return (yield from self._line(text, seconds, typed=True))
@@ -119,6 +125,8 @@ class Unit(Axis):
         self._fits(text)
         if self.programming and not typed:
             raise Busy(self.title, "is in program mode, where what it is sent is stored", advice="P ends that mode")
+        if self._storing and not typed:
+            self._connected = False  # it is to be seen whether that is over
         if not self._connected:
             yield from self.connect()
         if self._way.running:
@@ -130,11 +138,13 @@ class Unit(Axis):
         if len(text) > longest:
             behind = "behind the name " if longest != SingleMode.longest else ""
             raise ValueError(f"{text!r} has {len(text)} characters; a line has {longest} {behind}(pages 22 and 25)")
+        if self.mode == "sin10" and ";" in text:
+            raise ValueError(f"{text!r}: a SIN-10 takes ; for the end of a command (page 19); spool() takes several")
 
     def _enter(self, text: str, seconds: float, tries: int = TRIES) -> Steps[str]:
         """One line. If it breaks off, what stands in the line is not known: the next call clears it by connecting."""
         try:
-            return (yield from self._way.line(text, seconds, tries))
+            return (yield from self._unbroken(self._way.line(text, seconds, tries)))
         except NoAnswer as error:
             self._connected = isinstance(error, NotListening) and self._way.running
             if not self._connected and (yield from self._way.signs_on()):
@@ -145,13 +155,18 @@ class Unit(Axis):
         except BadAnswer:  # of a unit that came back in the middle of the line, say
             self._connected = False
             raise
+
+    def _unbroken(self, steps: Steps[T]) -> Steps[T]:
+        """`steps` behind which the line is clear. If they are broken off the next call clears it by connecting."""
+        try:
+            return (yield from steps)
         except GeneratorExit:  # the caller was cancelled
             self._connected, self._broken = False, True
             raise
 
     def _see_it_over(self) -> Steps[None]:
         """Raises Busy if the program that was started still runs."""
-        if not (yield from self._way.over()):
+        if not (yield from self._unbroken(self._way.over())):
             raise Busy(self.title, "runs a program and takes no line", advice="wait() for its end, stop() or halt() it")
         self._way.running = False
 
@@ -210,7 +225,8 @@ class Unit(Axis):
         self._stops += 1
         self._leave(None)
         yield from self._way.restart(character)
-        self._way.running = self.programming = False
+        self._way.running = False
+        self._takes_lines()
         self.forget()
 
     # -- names and adapters ------------------------------------------------------------------------------
@@ -235,12 +251,15 @@ class Unit(Axis):
         name_of_axis(name)
         if not self._connected:
             yield from self.connect()
-        yield from self.ask(CTRL_N, until(b"name?"), self._way.patience)
-        answer = yield from self.ask(name.encode(), until(b"\r\n"), self._way.patience + SAVING)
+        answer = yield from self._unbroken(self._named(name.encode()))
         if answer != name.encode() + b"\r\n":
             raise BadAnswer(self.title, f"does not take the name {name!r}", Spoken(name.encode(), answer))
         self.name = name
         self.title = self._way.title = f"DCB-274 {name}"
+
+    def _named(self, name: bytes) -> Steps[bytes]:
+        yield from self.ask(CTRL_N, until(b"name?"), self._way.patience)
+        return (yield from self.ask(name, until(b"\r\n"), self._way.patience + SAVING))
 
     @operation
     def name_chain(self) -> Steps[tuple[str, ...]]:
