@@ -318,10 +318,10 @@ def test_a_key_that_is_held_without_an_answer_is_let_go(tmp_path: Path) -> None:
             await desk.units.close()
 
     text = '[units.unit]\nmodel = "gs-c200"\n'
-    with Service(parse(text, "cell"), lambda file: "", [EndpointSpec("tcp", "127.0.0.1:0")]) as service:
-        with service.in_thread():
-            address = service.endpoints[0].address
-            at_desk(tmp_path, scene)
+    endpoints = [EndpointSpec("tcp", "127.0.0.1:0")]
+    with Service(parse(text, "cell"), lambda file: "", endpoints) as service, service.in_thread():
+        address = service.endpoints[0].address
+        at_desk(tmp_path, scene)
 
 
 def test_the_same_line_to_two_units(tmp_path: Path) -> None:

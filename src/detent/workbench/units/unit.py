@@ -314,9 +314,10 @@ class Unit:
     # -- a key that is held ------------------------------------------------------------------------------
 
     async def hold(self, rate: float) -> None:
-        """Run at `rate` as long as `still_held` is called. Raises as `perform`; where it may run for all that, it is stopped.
+        """Run at `rate` as long as `still_held` is called. Raises as `perform`.
 
-        A key that is held already, in another window, is held on if this one comes to nothing.
+        Where it may run for all that, it is stopped. A key that is held already, in another window, is held on if this
+        one comes to nothing.
         """
         if self.manual.hold:
             raise ValueError(self.manual.hold)
