@@ -144,7 +144,8 @@ class LineScripts:
                         await self._until(lambda state: not state.held)
                         await bench.type(unit, step.text)
                         since = bench.state.now
-                        await self._pass(who, bench.state.speaking[line] + SETTLED)
+                        while (quiet := bench.state.speaking[line] + SETTLED) > bench.state.now:
+                            await self._pass(who, quiet)
                         if (refused := bench.state.units[unit].error) is not None and refused != error:
                             raise ValueError(f"{unit} refused {refused.frame or step.text}: {refused.reason}")
                     case Pause():
