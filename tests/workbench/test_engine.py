@@ -22,6 +22,8 @@ from detent.ticks import MS, SECOND
 from detent.workbench.board import table
 from detent.workbench.client import Bench, BenchError
 from detent.workbench.engine import BASE, BATCH, LEAST_KEPT, keep
+from detent.workbench.line_scripts import LineScripts
+from detent.workbench.live import Live
 from detent.workbench.messages import State
 from detent.workbench.scope import Trigger
 
@@ -189,6 +191,31 @@ def test_a_program_at_the_pseudo_terminal_is_answered_while_one_goes_back_in_tim
             terminal.close()
 
     play(scene, "gs-c200", straps=["CHS=low"], endpoints=[EndpointSpec("pty")])
+
+
+def test_as_fast_as_it_goes_time_comes_to_what_is_waited_for() -> None:
+    """Nothing else is due in a cell at rest, where time would stand for ever."""
+
+    async def scene(bench: Bench) -> None:
+        unit, live = "gs-c200", Live()
+        await bench.pace(None)
+        await bench.power(unit, False)
+        with pytest.raises(BenchError, match="does not answer"):
+            await bench.save(unit)
+        await bench.power(unit, True)
+        scripts, began = LineScripts(bench, live), bench.state.now
+        scripts.start(unit, unit, "F\n@ 30\nF\n@ answer\n")
+        done = {"running": False, "line": 0, "told": "done"}
+        await bench.until(lambda _: live.get(f"script.{unit}") == done)
+        assert 30 * SECOND < bench.state.now - began < 31 * SECOND
+        await bench.hold()
+        await bench.alarm("somebody", bench.state.now + 1000 * SECOND)
+        await bench.alarm("somebody", None)
+        await bench.go()
+        await bench.set_pin(unit, "UI2", 0)  # it is done behind that
+        assert bench.state.now - began < 31 * SECOND
+
+    play(scene, "gs-c200")
 
 
 def test_actions_with_pins_straps_supply_and_memory(tmp_path: Path) -> None:

@@ -30,11 +30,13 @@ class Bench:
 
     def __init__(self) -> None:
         self.units = {"bar": SimpleNamespace(error=None)}
-        self.state = SimpleNamespace(now=0, held=False, speaking={"bar": 0}, units=self.units, real=None)
+        self.state = SimpleNamespace(now=0, held=False, past=False, speaking={"bar": 0}, units=self.units, real=None)
         self.picture = SimpleNamespace(lines={"bar": SimpleNamespace(units=("bar",))})
         self.sent: list[tuple[int, str]] = []
-        self.answers = 0
+        self.answers: list[Any] = []
         self.slow = 0
+        self.alarms: dict[str, int] = {}
+        self.back = 0  # to where time goes back when it has come to 10 s
 
     async def type(self, unit: str, text: str) -> None:
         if text == "BAD":
@@ -47,12 +49,20 @@ class Bench:
     async def until(self, condition: Callable[[Any], bool]) -> None:
         while not condition(self.state):
             self.state.now += SECOND // 4
-            if self.sent and self.state.now >= self.sent[-1][0] + SECOND:
-                self.answers = len(self.sent)
+            if self.back and self.state.now >= 10 * SECOND:
+                self.state.now, self.back = self.back, 0
+            if self.sent and self.state.now == self.sent[-1][0] + SECOND:
+                self.answers.append(SimpleNamespace(whole=True, sender="bar", end=self.state.now))
             await asyncio.sleep(0)
 
+    async def alarm(self, who: str, at: int | None) -> None:
+        if at is None:
+            self.alarms.pop(who, None)
+        else:
+            self.alarms[who] = at
+
     def terminal(self, line: str) -> Any:
-        return SimpleNamespace(rows=[SimpleNamespace(whole=True, sender="bar")] * self.answers)
+        return SimpleNamespace(rows=self.answers[-2:])  # what is older is not kept
 
 
 def run(text: str, then: Callable[[LineScripts], None] = lambda scripts: None) -> tuple[Bench, Live]:
@@ -80,6 +90,60 @@ def test_commands_go_out_in_order_with_pauses_in_the_time_of_the_cell() -> None:
 def test_a_script_can_wait_for_the_answer_to_its_last_command() -> None:
     bench, _ = run("+1\n@ answer\n+2\n@ answer\n+3\n")
     assert bench.sent == [(0, "+1"), (SECOND, "+2"), (2 * SECOND, "+3")]
+
+
+def test_answers_are_waited_for_however_many_there_were() -> None:
+    """Rows of a line are kept up to a number: that of the answers among them does not grow for ever."""
+    bench, live = run("+1\n@ answer\n" * 10)
+    assert [at for at, _ in bench.sent] == [n * SECOND for n in range(10)]
+    assert live.get("script.bar") == {"running": False, "line": 0, "told": "done"}
+
+
+def test_a_script_goes_on_where_time_has_gone_back() -> None:
+    """As much of a pause is left as there was, and an interval is counted from there."""
+
+    def rewinds(scripts: LineScripts) -> None:
+        scripts._bench.back = 2 * SECOND  # type: ignore[attr-defined]
+
+    bench, _ = run("+1\n@ 20\n+2\n@ answer\n+3\n", rewinds)
+    assert [at for at, _ in bench.sent][1:] == [
+        25 * SECOND // 2,
+        27 * SECOND // 2,
+    ]  # 20.25 s, from 9.75 s on 7.75 s earlier
+
+    bench = Bench()
+
+    async def whole() -> None:
+        scripts = LineScripts(bench, Live())  # type: ignore[arg-type]
+        bench.back = 2 * SECOND
+        scripts.repeat("bar", "bar", "F", SECOND)
+        while len(bench.sent) < 15:
+            await asyncio.sleep(0)
+        scripts.stop("bar")
+
+    asyncio.run(whole())
+    times = [at for at, _ in bench.sent]
+    assert times == [*(n * SECOND for n in range(10)), *(n * SECOND + SECOND // 4 for n in range(2, 7))]
+
+
+def test_a_script_that_waits_says_until_when_and_leaves_nothing_of_that() -> None:
+    """At max, time comes to an instant only if something is due then."""
+    bench, _ = run("+1\n@ 1.5\n+2\n", lambda scripts: scripts.stop("bar"))
+    assert bench.alarms == {}
+    seen: list[int | None] = []
+
+    def listens(scripts: LineScripts) -> None:
+        before = scripts._bench.alarm
+
+        async def alarm(who: str, at: int | None) -> None:
+            seen.append(at)
+            await before(who, at)
+
+        scripts._bench.alarm = alarm  # type: ignore[method-assign]
+
+    bench, _ = run("+1\n@ 1.5\n", listens)
+    assert seen[-2:] == [7 * SECOND // 4, None]
+    assert bench.alarms == {}
 
 
 def test_a_command_that_cannot_be_sent_ends_the_script_and_says_where() -> None:

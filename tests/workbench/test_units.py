@@ -16,7 +16,7 @@ from detent.cell.cell import Cell
 from detent.cell.description import parse
 from detent.cell.host import HostPort
 from detent.hosts.dcb274 import BlockingDcb274, Dcb274
-from detent.hosts.errors import DriverError
+from detent.hosts.errors import DriverError, Refused
 from detent.hosts.genstepper import BlockingGenStepper, GenStepper
 from detent.hosts.gsc200 import BlockingGsC200, GsC200
 from detent.hosts.supersigma import BlockingSupersigma, Supersigma
@@ -261,6 +261,66 @@ def test_hands_in_the_commands_of_the_controller(tmp_path: Path, model: str) -> 
         await desk.until(name, lambda facts: facts["position"] is not None and facts["position"] > 70)
 
     with served(model) as address:
+        at_desk(tmp_path, scene)
+
+
+@pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "bs0610"])
+def test_a_key_that_is_held_in_two_windows_is_let_go_when_neither_is_heard_of(tmp_path: Path, model: str) -> None:
+    """The second is told that the unit is busy, or that it does not take another rate while it moves."""
+
+    async def scene(desk: Desk) -> None:
+        name = await desk.units.unit_connect(
+            model, address, "motor=X patience=2" if model == "bs0610" else "patience=2"
+        )
+        await desk.until(name, lambda facts: facts["position"] == 0)
+        held = [desk.units.unit_hold(name, rate) for rate in (200.0, 300.0)]
+        _, second = await asyncio.gather(*held, return_exceptions=True)
+        assert isinstance(second, UnitBusy)
+        if model == "gs-c200":
+            with pytest.raises(Refused):  # T is not taken while it moves
+                await desk.units.unit_hold(name, 400.0)
+        facts = await desk.until(name, lambda facts: facts["outcome"])
+        assert facts["outcome"] == "stops by its ramp"
+        await desk.until(name, lambda facts: facts["position"] and not facts["moving"])
+
+    with served(model) as address:
+        at_desk(tmp_path, scene)
+
+
+def test_a_key_that_is_held_without_an_answer_is_let_go(tmp_path: Path) -> None:
+    """The unit may have understood: its answer was damaged, and the window does not say that the key is held."""
+
+    async def damaged(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        there, back = await asyncio.open_connection(*address.rsplit(":", 1))
+        asked = bytearray()
+
+        async def answers() -> None:
+            while data := await there.read(100):
+                writer.write(b"?" * len(data) if b"G+" in asked and b"Z" not in asked else data)
+
+        answering = asyncio.create_task(answers())
+        while data := await reader.read(100):
+            asked.extend(data)
+            back.write(data)
+        answering.cancel()
+        back.close()
+        writer.close()
+
+    async def scene(desk: Desk) -> None:
+        async with strange(damaged) as port:
+            name = await desk.units.unit_connect("gs-c200", port, "patience=0.4")
+            await desk.until(name, lambda facts: facts["position"] == 0)
+            with pytest.raises(DriverError):
+                await desk.units.unit_hold(name, 200.0)
+            facts = await desk.until(name, lambda facts: facts["outcome"])
+            assert facts["outcome"] == "stops by its ramp"
+            await desk.until(name, lambda facts: facts["position"] and not facts["moving"])
+            await desk.units.close()
+
+    text = '[units.unit]\nmodel = "gs-c200"\n'
+    endpoints = [EndpointSpec("tcp", "127.0.0.1:0")]
+    with Service(parse(text, "cell"), lambda file: "", endpoints) as service, service.in_thread():
+        address = service.endpoints[0].address
         at_desk(tmp_path, scene)
 
 

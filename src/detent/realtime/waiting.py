@@ -67,7 +67,8 @@ class Watched:
             return None
         at = self.cell.next_event()
         if self._waiters:
-            alarm = min(condition.next() for waiter in self._waiters for condition in waiter.conditions)
+            waiters = [waiter for waiter in self._waiters if not waiter.future.cancelled()]
+            alarm = min((condition.next() for waiter in waiters for condition in waiter.conditions), default=NEVER)
             if alarm < (NEVER if at is None else at):
                 return max(alarm, self.cell.now)
         return at

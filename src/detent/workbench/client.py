@@ -349,6 +349,10 @@ class Bench:
         """
         await self._ask("rewind", at)
 
+    async def alarm(self, who: str, at: Ns | None) -> None:
+        """Let time come to `at` for `who`, at max as well, where nothing else may be due; None: no longer."""
+        await self._ask("alarm", who, at)
+
     async def take_branch(self, number: int) -> None:
         """Hold, and let a future happen again that was left (`state.branches`); the one that is left for it is kept."""
         await self._ask("take_branch", number)
@@ -438,7 +442,9 @@ class Bench:
             now = state.units[unit]
             return now.stored > written or now.error != before or state.held or state.now > sent + PATIENCE
 
+        await self.alarm(f"save {unit}", sent + PATIENCE + 1)
         state = await self.until(over)
+        await self.alarm(f"save {unit}", None)
         now = state.units[unit]
         if now.stored > written:
             return f"{unit} has kept its program"

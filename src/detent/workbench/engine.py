@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
-from typing import ClassVar, Final, TypeVar
+from typing import Any, ClassVar, Final, TypeVar
 
 from detent.assembler import ImageError
 from detent.cell.actions import (
@@ -47,9 +47,9 @@ from detent.realtime.pace import Lateness as Counted
 from detent.realtime.pace import Pace, WallNs
 from detent.realtime.service import build_with_images, models, open_endpoints
 from detent.realtime.verbs import VERBS
-from detent.realtime.waiting import Watched
+from detent.realtime.waiting import Condition, Watched
 from detent.realtime.watch import Watch
-from detent.ticks import SECOND, Ns
+from detent.ticks import NEVER, SECOND, Ns
 from detent.uart import Chars
 from detent.workbench import look, rotors
 from detent.workbench.marks import Marks
@@ -96,6 +96,7 @@ class Engine:
         self._lateness = Lateness(0, 0, 0)
         self._quiet = False  # nothing has changed since it was last told
         self.waiting = Waiting(order.queue)
+        self._alarms: dict[str, Future[dict[str, Any]]] = {}
         self.control: str | None = None  # the URL of who looks and meddles
         self._cleanup = contextlib.ExitStack()
         with contextlib.ExitStack() as opening:
@@ -369,6 +370,15 @@ class Engine:
         if not self.history.step():
             self.history.stopped = "nothing more happens by itself"
 
+    def alarm(self, who: str, at: Ns | None) -> None:
+        """Let time come to `at` for `who`, at max as well, where nothing else may be due; None: no longer."""
+        before = self._alarms.pop(who, None)
+        if before is not None:
+            before.cancel()
+        if at is not None:
+            due = Condition(lambda: self.now >= at, lambda: at if self.now < at else NEVER)
+            self._alarms[who] = self.watched.wait([due], dict)
+
     def take_branch(self, number: int) -> None:
         """A future that was left happens again; the one that is left for it is kept."""
         self._stand()
@@ -584,7 +594,7 @@ class Engine:
 
     _VERBS: ClassVar[dict[str, Callable[..., object]]] = {
         verb.__name__: verb
-        for verb in (hold, go, step_event, step_instruction, step_back, rewind, run_to_address, set_breakpoints,
+        for verb in (hold, go, step_event, step_instruction, step_back, rewind, run_to_address, alarm, set_breakpoints,
                      set_breakpoint,
                      take_branch, compare_branch,
                      set_break_on_errors, power, set_switch, set_pin, place_switch, send_line, type, load, start, save,

@@ -7,6 +7,7 @@ an axis stands at fault, as it does after STOP: nothing of it is sent behind tha
 """
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -95,6 +96,7 @@ class LineScripts:
     def __init__(self, bench: "Bench", live: Live) -> None:
         self._bench, self._live = bench, live
         self._running: dict[str, asyncio.Task[None]] = {}
+        self._runs = 0
 
     def start(self, line: str, unit: str, text: str, comment: str = ";") -> None:
         """Run the script `text` on a line, its commands to `unit`. Raises ValueError, KeyError."""
@@ -126,9 +128,10 @@ class LineScripts:
     async def _run(self, line: str, unit: str, steps: list[Step]) -> None:
         told, at, place = "done", 0, 0
         bench = self._bench
-        due = bench.state.now
+        self._runs += 1
+        who = f"script {self._runs}"
+        due = since = bench.state.now
         try:
-            heard = self._heard(line)
             while place < len(steps):
                 step = steps[place]
                 at, place = step.line, place + 1
@@ -137,34 +140,70 @@ class LineScripts:
                     case Again():
                         place = 0
                     case Command():
-                        heard, error = self._heard(line), bench.state.units[unit].error
+                        error = bench.state.units[unit].error
                         await self._until(lambda state: not state.held)
                         await bench.type(unit, step.text)
-                        await self._until(lambda state: state.speaking[line] + SETTLED <= state.now)
+                        since = bench.state.now
+                        while (quiet := bench.state.speaking[line] + SETTLED) > bench.state.now:
+                            await self._pass(who, quiet)
                         if (refused := bench.state.units[unit].error) is not None and refused != error:
                             raise ValueError(f"{unit} refused {refused.frame or step.text}: {refused.reason}")
                     case Pause():
-                        until = bench.state.now + step.length
-                        if step.steady:
-                            until = due = max(due + step.length, bench.state.now)
-                        await self._until(lambda state, until=until: state.now >= until)  # type: ignore[misc]
+                        now, until = bench.state.now, bench.state.now + step.length
+                        due = await self._pass(who, min(max(due + step.length, now), until) if step.steady else until)
                     case Answered():
-                        await self._until(lambda state, heard=heard: self._heard(line) > heard)  # type: ignore[misc]
+                        await self._answered(line, since)
         except (ValueError, RuntimeError) as error:
             told = f"line {at}: {error}"
+        except KeyError:
+            told = f"line {at}: the cell has not this line and this unit any more"
+        finally:
+            with contextlib.suppress(RuntimeError):
+                await bench.alarm(who, None)
         self._running.pop(line, None)
         self._tell(line, {"running": False, "line": at if told != "done" else 0, "told": told})
 
+    async def _pass(self, who: str, until: Ns) -> Ns:
+        """Wait until the cell has come to `until`; when that was.
+
+        As fast as it goes, it comes there though nothing is due by then. Where its time goes back, and on from there,
+        `until` goes back as well: as much of the pause is left as there was.
+        """
+        last = self._bench.state.now
+
+        def over(state: State) -> bool:
+            nonlocal last
+            if state.past:
+                return False
+            back = state.now < last
+            last = last if back else state.now
+            return back or state.now >= until
+
+        while True:
+            await self._bench.alarm(who, until)
+            await self._until(over)
+            now = self._bench.state.now
+            if now >= until:
+                return until
+            until, last = until - (last - now), now
+
+    async def _answered(self, line: str, since: Ns) -> None:
+        """Wait until somebody has answered on a line behind `since`, or behind where its time has gone back to."""
+
+        def over(state: State) -> bool:
+            nonlocal since
+            if not state.past:
+                since = min(since, state.now)
+            return any(row.whole and row.sender and row.end > since for row in self._bench.terminal(line).rows)
+
+        await self._until(over)
+
     async def _until(self, condition: Callable[[State], bool]) -> None:
         """Wait for it. Raises ValueError once an axis of a machine stands at fault."""
-        await self._bench.until(lambda state: condition(state) or at_fault(state))
+        await self._bench.until(lambda state: at_fault(state) or condition(state))
         real = self._bench.state.real
         if real is not None and at_fault(self._bench.state):
             raise ValueError(f"nothing more is sent, as the machine stands: {real.why}")
-
-    def _heard(self, line: str) -> int:
-        """How many whole rows of answers there are."""
-        return sum(1 for row in self._bench.terminal(line).rows if row.whole and row.sender)
 
     def _tell(self, line: str, how: dict[str, Value]) -> None:
         self._live.put({f"script.{line}": how})

@@ -186,18 +186,19 @@ class Feed:
 
     async def _send(self) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            await self._tell_traces()
             while True:
-                if self._bench.picture is not self._picture:
-                    await self._tell_traces()
                 await self._stale.wait()
                 await self._painted.wait()
                 self._stale.clear()
+                if self._bench.picture is not self._picture:  # before anything is drawn of it
+                    await self._tell_traces()
                 if self._view is None:
                     continue
                 try:
                     packed_frame = self._frame(self._view)
                 except MISTAKES as error:  # of this view: the window may ask for another
-                    await self._wrong(str(error))
+                    await self._wrong(str(error.args[0] if error.args else error))
                     continue
                 self._painted.clear()
                 await self._socket.send_bytes(packed_frame)

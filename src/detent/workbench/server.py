@@ -59,6 +59,7 @@ def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place, st
 
         stopping.add("boards", stop_boards)
     units = Units(live, stopping, folder, state)
+    units.follow(bench)
     site = FastAPI(title="Detent", docs_url=None, redoc_url=None, openapi_url=None)
     guard = Guard(site, place.host, place.token, names_of_this_machine())
     Board(bench, live)

@@ -96,3 +96,24 @@ def test_what_a_new_cell_has_besides_its_wires_stands_in_the_file_as_a_person_wo
     window.until("() => document.querySelector('#toasts').textContent.includes('Saved: mine.toml')")
     assert 'CHS = "high"' in (bench.folder / "mine.toml").read_text()
     page.get_by_role("button", name="mine.toml").first.wait_for()
+
+
+def test_a_cell_that_is_opened_is_shown_on_every_page_of_every_window(windows: Windows, bench: Served) -> None:
+    """And the workbench is the host of no unit of the one before: another may be at that address by now."""
+    window = windows.new(bench).open("/begin")
+    window.call("open_place", "gs-c200")
+    pages = {path: windows.new(bench).open(path) for path in ("/program", "/motion", "/scope", "/unit")}
+    tabs = "(name) => document.querySelector('[role=tab][data-unit]')?.dataset.unit === name"
+    shown = "(first) => document.querySelector('[data-part=scope]').scope?.shown[0] === first"
+    for path in ("/program", "/motion"):
+        pages[path].until(tabs, "gs-c200")
+    pages["/scope"].until(shown, "gs-c200.position")
+    pages["/unit"].page.locator("[data-role=cell] button").first.click()
+    window.until("() => detent.get('r.names').length === 1 && detent.get('stop.able').length === 1")
+    window.call("open_place", "dcb-274")
+    for path in ("/program", "/motion"):
+        pages[path].until(tabs, "dcb-274")
+    pages["/scope"].until(shown, "dcb-274.position")
+    assert pages["/scope"].page.locator(".toast.error").count() == 0
+    window.until("() => !detent.get('r.names').length && !detent.get('stop.able').length")
+    assert window.get("r.gs-c200 (cell)") is None

@@ -47,6 +47,8 @@ def test_stop_stands_on_every_page_and_recover_goes_on(windows: Windows, driven:
         window.open(path)
         window.page.get_by_role("button", name=STOP, exact=True).wait_for()
     window.open("/")
+    window.page.get_by_role("region", name="Unit x").wait_for()
+    assert not window.page.get_by_text("Break it").is_visible(), "every fault is refused there"
     window.call("type", "x", "A1")
     window.call("type", "x", "+30000")
     window.until("() => detent.get('u.x.x..rate') > 0")

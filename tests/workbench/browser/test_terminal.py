@@ -135,3 +135,22 @@ def test_a_script_is_kept_when_one_goes_to_another_line_at_once(terminal: Window
     terminal.until("() => !document.querySelector('[data-role=script]').value.includes('bar')")
     terminal.page.get_by_role("tab", name="bar").click()
     terminal.until("() => document.querySelector('[data-role=script]').value.includes('+7 ; of the bar')")
+
+
+def test_a_line_that_is_chosen_while_the_cell_stands_shows_what_was_said(terminal: Window) -> None:
+    """Nothing moves the page to look again: also who chooses faster than the workbench answers sees his line."""
+    says = "(unit) => [...document.querySelectorAll('.said .who')].some((who) => who.textContent === `${unit}:`)"
+    for unit in ("bar", "drill"):
+        terminal.call("power", unit, False)
+        terminal.call("power", unit, True)
+        terminal.page.locator(f"[data-line={unit}]").click()
+        send(terminal, "F")
+        terminal.until(says, unit)
+    terminal.call("hold")
+    for unit in ("bar", "drill", "bar", "drill"):  # until the page has seen that it stands
+        terminal.page.locator(f"[data-line={unit}]").click()
+        terminal.until(says, unit)
+    hurried = "() => { for (const n of [0, 1]) document.querySelectorAll('[data-line]')[n].click(); }"
+    terminal.page.evaluate(hurried)
+    terminal.until(says, "drill")
+    terminal.call("go")

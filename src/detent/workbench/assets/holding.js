@@ -5,10 +5,10 @@ const HELD = 300; // ms between two words that a key is held
 
 /**
  * Make `buttons` run the unit `name()` at `rate(button)`, in steps/s with its sign, null for a rate that is none.
- * `sent(lines)` is told what was sent, `stopped(who, promise)` of the stop when the key is let go. Returns {letGo, end}:
+ * `sent(lines, who)` is told what was sent, `stopped(who, promise)` of the stop when the key is let go. Returns {letGo, end}:
  * `letGo(stop)` lets go of a key that is held, and stops the axis unless `stop` is false; `end` is for the end of the page.
  * @param {Part[]} buttons
- * @param {{name: () => string, rate: (button: Part) => number | null, sent: (lines: string[]) => void,
+ * @param {{name: () => string, rate: (button: Part) => number | null, sent: (lines: string[], who: string) => void,
  *   stopped: (who: string, stopping: Promise<string>) => void}} told
  */
 export function holding(buttons, { name, rate, sent, stopped }) {
@@ -33,7 +33,7 @@ export function holding(buttons, { name, rate, sent, stopped }) {
     const mine = (timer = setInterval(() => call("unit_held", held).catch(() => {}), HELD));
     try {
       const lines = await call("unit_hold", held, speed);
-      if (timer === mine) sent(lines);
+      if (timer === mine) sent(lines, held);
     } catch (error) {
       if (timer !== mine) return;
       letGo(false);

@@ -94,9 +94,12 @@ part("manual", (box) => {
     remember(`measure.${facts.name}`, measure.value);
   });
 
-  /** @param {any} facts */
+  /** @param {any} facts null where nobody is connected to it any more */
   function show(facts) {
-    if (!facts) return;
+    if (!facts) {
+      for (const one of box.querySelectorAll("[data-jog], [data-hold], [data-home], [data-role=go], [data-role=zero]")) one.disabled = false;
+      return;
+    }
     const busy = Boolean(facts.job || facts.lost || facts.stopping);
     for (const one of box.querySelectorAll("[data-jog], [data-role=go], [data-role=zero]")) one.disabled = busy;
     for (const one of box.querySelectorAll("[data-home]")) {

@@ -89,10 +89,15 @@ export class Scope {
     if (news.traces) {
       this.catalogue = news.traces;
       const known = new Set(this.catalogue.map((trace) => trace.id));
-      if (!this.known) this.shown = (remembered(news.cell) || news.first).filter((/** @type {string} */ id) => known.has(id));
-      this.known = true;
-      if (!this.shown.length) this.shown = news.first;
+      if (news.cell !== this.cell) {
+        this.shown = remembered(news.cell) || news.first;
+        this.cursors = [null, null];
+        this.following = true;
+      }
       this.cell = news.cell;
+      this.known = true;
+      this.shown = this.shown.filter((/** @type {string} */ id) => known.has(id));
+      if (!this.shown.length) this.shown = news.first;
       this.tools.offer(this.catalogue, this.shown);
       this.arrange();
     }

@@ -1,6 +1,7 @@
 // The page Terminal: rows of a line as they come, lines and scripts to send.
 
 import { wordsOf } from "./forms.js";
+import { Looking } from "./looking.js";
 import { bytes } from "./typed_bytes.js";
 
 const { part, on, frame, get, call, toast, failed, seconds, remembered, remember } = window.detent;
@@ -25,7 +26,7 @@ part("terminal", (box) => {
   let next = 0;
   /** @type {number | null} */
   let cut = null;
-  let asking = false;
+  let chosen = 0; // counts the lines that were chosen
   let looked = 0;
   /** @type {number | null} */
   let seen = null;
@@ -80,19 +81,19 @@ part("terminal", (box) => {
     talk.classList.remove("away");
   }
 
-  async function look() {
-    if (asking || document.hidden) return;
-    asking = true;
+  const looking = new Looking(async () => {
+    if (document.hidden) return;
     looked = performance.now();
-    const mine = line;
+    seen = get("now");
+    const mine = chosen;
     try {
-      let told = await call("terminal", mine, next);
-      if (mine !== line) return;
+      let told = await call("terminal", line, next);
+      if (mine !== chosen) return;
       if (cut !== null && told.cut !== cut) {
         next = 0;
         rows.replaceChildren();
-        told = await call("terminal", mine, 0);
-        if (mine !== line) return;
+        told = await call("terminal", line, 0);
+        if (mine !== chosen) return;
       }
       cut = told.cut;
       const stay = !atEnd();
@@ -103,20 +104,18 @@ part("terminal", (box) => {
       if (!rows.children.length && !rows.dataset.empty) rows.dataset.empty = "yes";
       if (!stay) toEnd();
       else talk.classList.toggle("away", rows.scrollHeight > rows.clientHeight && stay);
-    } catch {
-      /* the connection is told elsewhere */
-    } finally {
-      asking = false;
+    } catch (error) {
+      seen = null; // when there is a connection again, however the cell stands
+      throw error;
     }
-  }
+  });
+  const look = () => looking.soon();
 
   function soon() {
-    const now = get("now");
-    if (now === seen || timer) return;
+    if (get("now") === seen || timer) return;
     const wait = Math.max(0, looked + EVERY - performance.now());
     timer = setTimeout(() => {
       timer = 0;
-      seen = get("now");
       look();
     }, wait);
   }
@@ -125,6 +124,7 @@ part("terminal", (box) => {
   function choose(name) {
     keepNow();
     line = name;
+    chosen += 1;
     remember("line", name);
     for (const tab of box.querySelectorAll("[data-line]")) tab.setAttribute("aria-selected", tab.dataset.line === name ? "true" : "false");
     for (const end of box.querySelectorAll("[data-ends]")) end.hidden = end.dataset.ends !== name;
@@ -363,9 +363,11 @@ part("terminal", (box) => {
   for (const tab of box.querySelectorAll("[data-line]")) tab.addEventListener("click", () => choose(tab.dataset.line));
 
   const ends = [frame(soon), on("script.", progress), on("queue", queue)];
+  document.addEventListener("visibilitychange", look); // it did not look while it was out of sight
   choose(line);
   return () => {
     ends.forEach((end) => end());
+    document.removeEventListener("visibilitychange", look);
     clearTimeout(timer);
   };
 });

@@ -3,12 +3,14 @@
 import { worded } from "./elements.js";
 import { apart, remeasured, wholeSteps, wordsOf } from "./forms.js";
 import { holding } from "./holding.js";
+import { Looking } from "./looking.js";
 
 const { part, on, get, call, meant, make, toast, failed, remembered, remember, seconds, grouped } = window.detent;
 
 /** @typedef {[string, string | null, string, boolean]} Told name, value, where it is from, whether it is a lamp */
 
 const MOST = 800; // rows on the page
+const LONG = 300; // characters of what is told above the page
 const ARMED = 3000; // ms in which a second click is a yes
 
 part("unit", (box) => {
@@ -23,8 +25,7 @@ part("unit", (box) => {
   let chosen = null;
   let scaled = 1; // steps in one of what the fields say
   let next = 0;
-  let asking = false;
-  let again = false;
+  let choices = 0; // counts the units that were chosen
   /** @type {{button: HTMLElement, text: string | null, timer: number} | null} a key that asks whether one is sure */
   let armed = null;
   let seen = "";
@@ -97,11 +98,23 @@ part("unit", (box) => {
     return made;
   }
 
+  /**
+   * What came of something that `who` was asked for, where it belongs; above the page where another unit is shown by then.
+   * @param {string} who
+   * @param {"sent" | "told"} place
+   * @param {string} text
+   */
+  function came(who, place, text) {
+    if (who === shown()) role(place).textContent = text;
+    else toast(`${who}: ${text.length > LONG ? `${text.slice(0, LONG)}…` : text}`);
+  }
+
   /** @param {string | null} name */
   function choose(name) {
     held.letGo();
     disarm();
     chosen = name;
+    choices += 1;
     if (name !== null) remember("unit", name);
     form.hidden = name !== null;
     role("bench").hidden = name === null;
@@ -216,7 +229,7 @@ part("unit", (box) => {
     const program = facts[told.model] && !["bs0610", "bs0710", "supersigma"].includes(told.model);
     role("program").hidden = !program;
     box.querySelector(".keeps").hidden = told.model === "supersigma";
-    soon();
+    looking.soon();
   }
 
   /** @param {Told} told */
@@ -301,8 +314,9 @@ part("unit", (box) => {
    * @param {number} value
    */
   async function hand(what, value) {
-    const sent = await tried(() => call("unit_move", shown(), what, value));
-    if (sent) role("sent").textContent = sent.length ? `sent ${sent.join(", ")}` : "nothing had to be sent";
+    const who = shown();
+    const sent = await tried(() => call("unit_move", who, what, value));
+    if (sent) came(who, "sent", sent.length ? `sent ${sent.join(", ")}` : "nothing had to be sent");
   }
 
   for (const button of all("[data-jog]")) button.addEventListener("click", () => {
@@ -326,7 +340,7 @@ part("unit", (box) => {
     document.dispatchEvent(new CustomEvent("detent-stopping", { detail: { who, stopping } }));
     held.letGo(false);
     const told = await stopping.catch(() => ""); // it stands above the page
-    if (told) role("sent").textContent = told;
+    if (told) came(who, "sent", told);
   }
 
   const held = holding(all("[data-hold]"), {
@@ -337,7 +351,7 @@ part("unit", (box) => {
       toast("Write a rate first.", "error");
       return null;
     },
-    sent: (lines) => (role("sent").textContent = `sent ${lines.join(", ")}`),
+    sent: (lines, who) => came(who, "sent", `sent ${lines.join(", ")}`),
     stopped,
   });
 
@@ -360,31 +374,17 @@ part("unit", (box) => {
     return made;
   }
 
-  async function soon() {
-    if (asking) {
-      again = true;
-      return;
-    }
-    asking = true;
-    const mine = shown();
-    try {
-      do {
-        again = false;
-        const told = await call("unit_talk", mine, next);
-        if (mine !== chosen) break;
-        const stay = rows.scrollHeight - rows.scrollTop - rows.clientHeight > 40;
-        for (let last; (last = rows.lastElementChild) && Number(last.dataset.number) >= told.first;) last.remove();
-        rows.append(...told.rows.map(row));
-        while (rows.children.length > MOST) rows.firstElementChild.remove();
-        next = told.next;
-        if (!stay) rows.scrollTop = rows.scrollHeight;
-      } while (again);
-    } catch {
-      /* the connection is told elsewhere */
-    } finally {
-      asking = false;
-    }
-  }
+  const looking = new Looking(async () => {
+    const mine = choices;
+    const told = await call("unit_talk", shown(), next);
+    if (mine !== choices) return;
+    const stay = rows.scrollHeight - rows.scrollTop - rows.clientHeight > 40;
+    for (let last; (last = rows.lastElementChild) && Number(last.dataset.number) >= told.first;) last.remove();
+    rows.append(...told.rows.map(row));
+    while (rows.children.length > MOST) rows.firstElementChild.remove();
+    next = told.next;
+    if (!stay) rows.scrollTop = rows.scrollHeight;
+  });
 
   function besides() {
     const select = role("beside");
@@ -410,7 +410,9 @@ part("unit", (box) => {
     role("text").value = "";
     hint();
     const other = role("beside").value;
-    const told = await tried(() => (other ? call("unit_both", [chosen, other], line) : call("unit_say", shown(), line)));
+    const who = shown();
+    const told = await tried(() => (other ? call("unit_both", [who, other], line) : call("unit_say", who, line)));
+    if (who !== shown()) return; // another unit is shown by now: an error was told, and what was said is on its line
     if (!told) {
       if (!role("text").value) role("text").value = line; // to be mended
       return;
@@ -456,7 +458,7 @@ part("unit", (box) => {
   // -- program and backup --
 
   /** @param {string} text */
-  const tell = (text) => (role("told").textContent = text);
+  const tell = (text, who = shown()) => came(who, "told", text);
   const source = () => role("source").value;
   const keep = () => remember(`source.${shown()}`, source()); // what is written for a unit is found again, and is no other's
   role("source").addEventListener("input", keep);
@@ -483,12 +485,14 @@ part("unit", (box) => {
     else read();
   });
   role("compare").addEventListener("click", async () => {
-    const lines = await tried(() => call("unit_compare", shown(), source()));
-    if (lines) tell(lines.length ? lines.join("\n") : "the unit holds this program");
+    const who = shown();
+    const lines = await tried(() => call("unit_compare", who, source()));
+    if (lines) tell(lines.length ? lines.join("\n") : "the unit holds this program", who);
   });
   role("store").addEventListener("click", (event) => sure(event.currentTarget, "Click once more: the program in the unit is replaced by this one. It is not started.", async () => {
-    const told = await tried(() => call("unit_store", shown(), source(), role("save").checked));
-    if (told) tell(told);
+    const who = shown();
+    const told = await tried(() => call("unit_store", who, source(), role("save").checked));
+    if (told) tell(told, who);
   }));
 
   const file = () => role("file").value.trim() || `${now().model}-backup.toml`;
@@ -499,29 +503,37 @@ part("unit", (box) => {
   role("file").addEventListener("input", () => (role("restore").hidden = true));
   role("backup").addEventListener("click", async () => {
     const name = file();
+    const who = shown();
     role("file").value = name;
     try {
-      tell(`Wrote ${await call("unit_backup", shown(), name, false)}`);
+      tell(`Wrote ${await call("unit_backup", who, name, false)}`, who);
     } catch (error) {
-      if (!/there already/.test(wordsOf(error))) failed(error);
+      if (!/there already/.test(wordsOf(error)) || who !== shown()) failed(error);
       else sure(role("backup"), `${name} is there already. Click once more to replace it.`, async () => {
-        const told = await tried(() => call("unit_backup", shown(), name, true));
-        if (told) tell(`Wrote ${told}`);
+        const told = await tried(() => call("unit_backup", who, name, true));
+        if (told) tell(`Wrote ${told}`, who);
       });
     }
   });
   let differed = "";
   role("differs").addEventListener("click", async () => {
-    const told = await tried(() => call("unit_differs", shown(), file()));
+    const who = shown();
+    const name = file();
+    const told = await tried(() => call("unit_differs", who, name));
     if (!told) return;
+    if (who !== shown() || name !== file()) {
+      toast(`${who} was compared with ${name}, but another unit or file is chosen by now: look again.`);
+      return;
+    }
     differed = told.seen;
     role("restore").hidden = !told.lines.length;
     tell(told.lines.length ? told.lines.join("\n") : "Nothing differs: the unit holds what the file says.");
   });
   role("restore").addEventListener("click", async () => {
     role("restore").hidden = true;
-    const told = await tried(() => call("unit_restore", shown(), file(), differed));
-    if (told) tell(told.join("\n"));
+    const who = shown();
+    const told = await tried(() => call("unit_restore", who, file(), differed));
+    if (told) tell(told.join("\n"), who);
   });
 
   const ends = [

@@ -23,8 +23,8 @@ after each push, ``detent.get(KEY)`` tells a value, ``await detent.call(NAME, ..
 ``detent.toast(text, "error")`` says something, ``detent.failed(error)`` what was thrown,
 ``detent.onTheme(f)`` calls f("light" or "dark") now and at each change.
 
-In Python, `Window.each_state` calls back at each push as long as the page is shown, and `Live.offer` adds a call for
-scripts; what a call raises is shown to the person who made it.
+In Python, `Window.each_state` calls back at each push as long as the page is shown, `Window.each_picture` when the
+cell is another, and `Live.offer` adds a call for scripts; what a call raises is shown to the person who made it.
 
 **Looks.** Colours, sizes and type are the custom properties at the top of ``assets/workbench.css`` (``--panel``,
 ``--ink``, ``--ink-2``, ``--line``, ``--accent``, ``--led-on``, ``--trace-1`` to ``--trace-8`` and more), which follow
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
     from detent.workbench.client import Bench
     from detent.workbench.live import Live
+    from detent.workbench.messages import Picture
 
 
 STOP_KEY = """<button type="button" class="key stop" data-part="stop" hidden
@@ -75,6 +76,20 @@ class Window:
     def each_state(self, handler: Callable[[], None]) -> None:
         """Call `handler` at each push of the bench's state, until the page is left or the window closed."""
         self._leave.append(self.bench.on_change(handler))
+
+    def each_picture(self, part: "Callable[[Picture], object]", handler: Callable[[], object]) -> None:
+        """The same whenever `part` of the picture of the cell is another: where another cell is shown, say."""
+        seen, before = self.bench.picture, part(self.bench.picture)
+
+        def look() -> None:
+            nonlocal seen, before
+            if self.bench.picture is not seen:
+                seen, last = self.bench.picture, before
+                before = part(seen)
+                if before != last:
+                    handler()
+
+        self.each_state(look)
 
     def leave(self) -> None:
         """The page is left: everything that it asked for ends."""

@@ -82,16 +82,17 @@ def _breaking(picture: Picture, control: str | None) -> str:
     programs = f"""<p class="programs quiet">Programs look at this cell and meddle with it, too: <button type="button"
  class="endpoint num" data-part="copy" data-copy="{escape(command)}" data-help="Without a word more it shows how
 everything stands; help lists what else it does. Click to copy">{escape(command)}</button></p>"""
-    return f"""<section class="panel breaking" aria-label="Break it" data-part="breaking"
+    shown = "" if control else " unreal"  # a machine is not broken for a trial: the engine refuses it
+    return f"""<section class="panel breaking{shown}" aria-label="Break it" data-part="breaking"
  data-kinds="{escape(json.dumps(kinds))}" data-helps="{escape(json.dumps(helps))}">
-<div class="panel-head"><h2>Break it</h2><span class="quiet grow">What a real cell does some day: every fault can be
-mended<span class="unreal">, and taken back on the time line</span>.</span></div>
-<form class="row"><select class="field" name="kind" aria-label="What breaks">{options}</select>
+<div class="panel-head unreal"><h2>Break it</h2><span class="quiet grow">What a real cell does some day: every fault can
+be mended, and taken back on the time line.</span></div>
+<form class="row unreal"><select class="field" name="kind" aria-label="What breaks">{options}</select>
 <select class="field" name="where" aria-label="Where"></select><span class="row more"></span>
 <label class="quiet">for <input class="field num" name="for" placeholder="until mended" aria-label="For how long"
  data-help="A time like 200 ms, or seconds; empty: until it is mended"></label>
 <button class="key primary">Break</button></form>
-<ul class="standing" aria-label="Faults that stand"></ul>{programs if control else ""}</section>"""
+<ul class="standing unreal" aria-label="Faults that stand"></ul>{programs if control else ""}</section>"""
 
 
 def _panel(switches: Iterable[SwitchPicture]) -> str:

@@ -21,11 +21,16 @@ if TYPE_CHECKING:
 
 
 def build(bench: "Bench", window: Window) -> None:
-    """The frame of the page; the script fills it in."""
+    """The frame of the page, which the script fills in; anew where the axes are others."""
     from nicegui import ui
 
-    tabs = "".join(_tab(unit, axis) for unit in bench.picture.units.values() for axis in unit.axes)
-    ui.html(_page(tabs), sanitize=False).classes("motion-page")
+    @ui.refreshable
+    def page() -> None:
+        tabs = "".join(_tab(unit, axis) for unit in bench.picture.units.values() for axis in unit.axes)
+        ui.html(_page(tabs), sanitize=False).classes("motion-page")
+
+    page()
+    window.each_picture(lambda picture: (picture.target, picture.units), page.refresh)
 
 
 def offer(site: "FastAPI", bench: "Bench", live: "Live") -> None:

@@ -19,11 +19,16 @@ SHOWN_PINS = 24  # in the watch, of each kind: a part with more is looked at on 
 
 
 def build(bench: "Bench", window: Window) -> None:
-    """The frame of the page, and for each controller what the watch shows of it."""
+    """The frame of the page, and for each controller what the watch shows of it; anew where they are others."""
     from nicegui import ui
 
-    units = [unit for unit in bench.picture.units.values() if unit.axes]
-    ui.html(_page(units), sanitize=False).classes("program-page")
+    @ui.refreshable
+    def page() -> None:
+        units = [unit for unit in bench.picture.units.values() if unit.axes]
+        ui.html(_page(units), sanitize=False).classes("program-page")
+
+    page()
+    window.each_picture(lambda picture: (picture.target, picture.units), page.refresh)
 
 
 def offer(site: "FastAPI", bench: "Bench", live: "Live") -> None:

@@ -34,16 +34,8 @@ def build(bench: "Bench", window: Window) -> None:
     def page() -> None:
         ui.html(markup(bench.picture), sanitize=False)
 
-    seen = bench.picture.lines
-
-    def look() -> None:
-        nonlocal seen
-        if bench.picture.lines != seen:
-            seen = bench.picture.lines
-            page.refresh()
-
     page()
-    window.each_state(look)
+    window.each_picture(lambda picture: picture.lines, page.refresh)
 
 
 def offer(site: "FastAPI", bench: "Bench", live: Live) -> None:

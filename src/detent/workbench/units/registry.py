@@ -10,7 +10,7 @@ import json
 from collections.abc import Awaitable, Callable, Sequence
 from difflib import unified_diff
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, cast
 
 from pydantic import Field
 
@@ -30,9 +30,14 @@ from detent.workbench.stopping import Stopping
 from detent.workbench.talk import Row
 from detent.workbench.units import manual
 from detent.workbench.units.backups import backup_of, check_fits, explained, file_before
+from detent.workbench.units.beside import emulated
 from detent.workbench.units.programs import lines_of, numbered_lines_of, places_of, source_of
 from detent.workbench.units.transcript import HOST
 from detent.workbench.units.unit import RATES, Unit, options_of
+
+if TYPE_CHECKING:
+    from detent.workbench.client import Bench
+    from detent.workbench.messages import Picture
 
 T = TypeVar("T")
 Name = Annotated[str, Field(max_length=200)]
@@ -51,6 +56,7 @@ class Units:
         """Backups are read and written in `folder`; what a restore replaces is kept below `state`."""
         self._live, self._stopping, self._folder, self._state = live, stopping, folder, state
         self._units: dict[str, Unit] = {}
+        self._leaving: set[asyncio.Task[None]] = set()
         self._connecting = asyncio.Lock()  # two clicks are one connection
         self._turning = asyncio.Lock()  # the last word counts, not the last to be done
         live.put({"r.names": []})
@@ -91,7 +97,35 @@ class Units:
         del self._units[name]
         self._stopping.remove(name)
         self._live.put({"r.names": list(self._units)})
+        self._live.put({f"r.{name}": None})  # behind the names: nobody shows it by then
         await unit.close()
+
+    def follow(self, bench: "Bench") -> None:
+        """Let go of the units of the cell of `bench` when its process is another one, or they are not in it any more.
+
+        Who wants to speak to them again connects anew: what is at their address by then may be something else.
+        """
+        ends, process = _ends(bench), bench.engine_pid
+
+        def look() -> None:
+            nonlocal ends, process
+            if bench.engine_pid is None or (bench.picture is ends[0] and bench.engine_pid == process):
+                return
+            (_, before), same = ends, bench.engine_pid == process
+            ends, process = _ends(bench), bench.engine_pid
+            for unit in list(self._units.values()):
+                end = unit.model, unit.address
+                if end in before and not (same and end in ends[1]):
+                    leaving = asyncio.create_task(self.unit_leave(unit.name))
+                    self._leaving.add(leaving)
+                    leaving.add_done_callback(self._left)
+
+        bench.on_change(look)
+
+    def _left(self, leaving: "asyncio.Task[None]") -> None:
+        self._leaving.discard(leaving)
+        if not leaving.cancelled():
+            leaving.exception()  # its port is gone, or somebody has left it meanwhile
 
     async def close(self) -> None:
         """Let go of all of them."""
@@ -285,6 +319,11 @@ class Units:
         if saved is None:
             raise ValueError(f"a {unit.model} keeps nothing that it tells: what it knows is burnt into its EPROM")
         return backup_of(unit.model, unit.address, await unit.perform("reading what it keeps", saved()))
+
+
+def _ends(bench: "Bench") -> tuple["Picture", set[tuple[str, str]]]:
+    """The picture of the cell of `bench`; model and address of each unit that it has."""
+    return bench.picture, {(one.model, one.address) for one in emulated(bench.picture)}
 
 
 def _line_said(unit: str, said: Said, ms: float | None = None) -> LineSaid:

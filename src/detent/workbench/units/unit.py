@@ -314,18 +314,29 @@ class Unit:
     # -- a key that is held ------------------------------------------------------------------------------
 
     async def hold(self, rate: float) -> None:
-        """Run at `rate` as long as `still_held` is called. Raises as `perform`."""
+        """Run at `rate` as long as `still_held` is called. Raises as `perform`.
+
+        Where it may run for all that, it is stopped. A key that is held already, in another window, is held on if this
+        one comes to nothing.
+        """
         if self.manual.hold:
             raise ValueError(self.manual.hold)
         driver = self.shell.driver
         assert isinstance(driver, Axis)
         check_moves(driver)
-        self._held_until = asyncio.get_running_loop().time() + HOLD_SECONDS
+        loop = asyncio.get_running_loop()
+        already = self._held_until > 0
+        self._held_until = loop.time() + HOLD_SECONDS
         self._guard = asyncio.create_task(self._dead_man())
         try:
             await self.perform("jog", run_at(driver, rate))
-        except BaseException:
-            self._held_until = 0.0
+        except (UnitBusy, Refused, ValueError):  # it does not run for this
+            if not already:
+                self._held_until = 0.0
+            raise
+        except BaseException:  # its answer was damaged, say: nobody says that the key is held, and the axis is stopped
+            if self._held_until:
+                self._held_until = loop.time()
             raise
 
     async def _dead_man(self) -> None:
