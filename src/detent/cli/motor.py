@@ -118,8 +118,6 @@ def motor(
         _judge(asked, many, facts, sensitivity, pull_in, plot, json)
     except ValueError as error:  # MotorError, SettingError, CatalogueError
         asked_wrongly(error)
-    except ImportError as error:
-        failed(error)
     except OSError as error:
         failed(of_system(error))
 

@@ -98,7 +98,6 @@ def _bar(rows: int) -> "Iterator[Watch]":
 def _answers(tasks: "Sequence[Task]", workers: int | None, scheduler: str | None, watch: "Watch") -> "Iterator[Answer]":
     """What was found for each, in order, as it comes."""
     from detent.cli.endings import asked_wrongly, failed
-    from detent.extras import MissingExtra
     from detent.tuner.batch import answer, answers
     from detent.tuner.search import Progress
 
@@ -123,7 +122,7 @@ def _answers(tasks: "Sequence[Task]", workers: int | None, scheduler: str | None
                 yield one
         except ValueError as error:
             asked_wrongly(error)
-        except (WorkersLost, MissingExtra) as error:
+        except WorkersLost as error:
             failed(error)
 
 
