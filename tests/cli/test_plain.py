@@ -1,7 +1,11 @@
-"""Outputs on a terminal without our signs."""
+"""Outputs on a terminal without our signs or without columns, on a stream that is closed, on a disk that is full."""
 
+import errno
 import io
+import os
 import sys
+from pathlib import Path
+from subprocess import run
 
 import pytest
 
@@ -22,3 +26,74 @@ def test_signs_that_a_terminal_lacks_are_written_with_those_it_has(monkeypatch: 
 
 def test_every_sign_is_spelt_with_signs_that_all_terminals_have() -> None:
     assert all(spelt.isascii() for spelt in plain.SIGNS.values())
+
+
+@pytest.mark.parametrize("closed", ["stdin", "stdout", "stderr"])
+@pytest.mark.parametrize(
+    ("line", "status"),
+    [
+        ("--help", 0), ("--version", 0), ("run --help", 0), ("models", 0), ("motor", 0), ("wiring", 0),
+        ("models no-such", 2), ("models --no-such", 2), ("terminal gs-c200", 0),
+        ("run gs-c200 --send F", 0), ("run gs-c200 --send T5000", 1),
+    ],
+)  # fmt: skip
+def test_a_standard_stream_that_is_closed_leads_to_nowhere(
+    line: str, status: int, closed: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    monkeypatch.setattr(sys, closed, None)
+    with pytest.raises(SystemExit) as ended:
+        main(line.split())
+    assert (ended.value.code or 0) == status
+    printed = capsys.readouterr()
+    if closed == "stderr":  # what is wrong is not said among the answers
+        assert "detent: " not in printed.out
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there a shell cannot close a stream")
+def test_no_file_that_is_written_takes_the_place_of_a_closed_stream(tmp_path: Path) -> None:
+    words = '"$0" -m detent run gs-c200 --send +10 --vcd pulses.vcd'
+    closed = run(["sh", "-c", f"{words} <&- >&- 2>&-", sys.executable], cwd=tmp_path, check=False)
+    assert closed.returncode == 0
+    written = (tmp_path / "pulses.vcd").read_bytes()
+    done = run(["sh", "-c", f"{words} --overwrite", sys.executable], cwd=tmp_path, capture_output=True, check=False)
+    assert done.returncode == 0
+    assert written == (tmp_path / "pulses.vcd").read_bytes()
+
+
+class Full(io.StringIO):
+    """A file on a disk that is full."""
+
+    encoding = "utf-8"
+
+    def write(self, text: str) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.parametrize("line", ["--help", "run --help", "models", "models --json", "size"])
+def test_an_output_on_a_full_disk_is_told_in_a_line(
+    line: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "stdout", Full())
+    with pytest.raises(SystemExit) as ended:
+        main(line.split())
+    assert ended.value.code == 1
+    assert capsys.readouterr().err == "detent: No space left on device\n"
+
+
+@pytest.mark.parametrize("columns", ["0", "00", ""])
+@pytest.mark.parametrize("line", ["--help", "run --help"])
+def test_a_terminal_that_is_said_to_have_no_columns_has_as_many_as_usual(
+    line: str, columns: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def told() -> str:
+        with pytest.raises(SystemExit):
+            main(line.split())
+        return capsys.readouterr().out
+
+    monkeypatch.delenv("COLUMNS", raising=False)
+    usual = told()
+    monkeypatch.setenv("COLUMNS", columns)
+    plain.find_columns()  # not what comes behind it, which took all of the memory
+    assert "COLUMNS" not in os.environ
+    assert told() == usual
