@@ -24,6 +24,19 @@ def test_signs_that_a_terminal_lacks_are_written_with_those_it_has(monkeypatch: 
     assert printed.endswith("+-40 us ?\n")
 
 
+@pytest.mark.parametrize("line", ["motor", "motor qsh4218-41-10-035", "models dcb-274", "run no\udcff.toml", "--help"])
+def test_the_c_locale_lacks_signs_too_and_keeps_bytes_that_are_none(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """There Python writes bytes of a file name as they were, and failed at a degree sign."""
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding="ascii", errors="surrogateescape")
+    monkeypatch.setattr(sys, "stdout", terminal)
+    with pytest.raises(SystemExit) as ended:
+        main(line.split(" "))
+    assert (ended.value.code or 0) == (2 if line.startswith("run") else 0)
+    print("\N{PLUS-MINUS SIGN}\udcff\N{SNOWMAN}")
+    terminal.flush()
+    assert terminal.buffer.getvalue().endswith(b"+-\xff?\n")  # type: ignore[attr-defined]
+
+
 def test_every_sign_is_spelt_with_signs_that_all_terminals_have() -> None:
     assert all(spelt.isascii() for spelt in plain.SIGNS.values())
 

@@ -17,10 +17,19 @@ SIGNS = {
 }  # fmt: skip
 
 
-def spell_out(error: UnicodeError) -> tuple[str, int]:
+def spell_out(error: UnicodeError) -> tuple[str | bytes, int]:
     """The signs that cannot be encoded, in others; ``?`` for one that has none."""
     assert isinstance(error, UnicodeEncodeError)
     return "".join(SIGNS.get(sign, "?") for sign in error.object[error.start : error.end]), error.end
+
+
+def spell_out_but_bytes(error: UnicodeError) -> tuple[str | bytes, int]:
+    """The same, but for a byte of a name that was no text: that is written as it was."""
+    assert isinstance(error, UnicodeEncodeError)
+    sign = ord(error.object[error.start])
+    if 0xDC80 <= sign <= 0xDCFF:
+        return bytes([sign - 0xDC00]), error.start + 1
+    return SIGNS.get(chr(sign), "?"), error.start + 1
 
 
 def open_closed() -> None:
@@ -51,6 +60,8 @@ def find_columns() -> None:
 def make_safe() -> None:
     """Nothing that is printed from now on fails for its signs."""
     codecs.register_error("detent.plain", spell_out)
+    codecs.register_error("detent.plain.bytes", spell_out_but_bytes)
+    instead = {"strict": "detent.plain", "surrogateescape": "detent.plain.bytes"}  # the latter with LC_ALL=C
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure") and stream.errors == "strict":
-            stream.reconfigure(errors="detent.plain")
+        if hasattr(stream, "reconfigure") and stream.errors in instead:
+            stream.reconfigure(errors=instead[stream.errors])
