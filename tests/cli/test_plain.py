@@ -94,6 +94,55 @@ def test_an_output_on_a_full_disk_is_told_in_a_line(
     assert capsys.readouterr().err == "detent: No space left on device\n"
 
 
+class Unread(io.StringIO):
+    """A pipe to `head` that has seen enough."""
+
+    encoding = "utf-8"
+
+    def __init__(self, descriptor: int) -> None:
+        super().__init__()
+        self._descriptor = descriptor
+
+    def fileno(self) -> int:
+        return self._descriptor
+
+    def write(self, text: str) -> int:
+        raise BrokenPipeError(errno.EPIPE, "Broken pipe")
+
+
+MOTOR = "--motor qsh4218-41-10-035 --moves 5 --variants 1"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "--help", "asm --help", "models", "models --json", "examples", "demo menu --json", "run gs-c200",
+        "run gs-c200 --json",
+        "asm gs-c200 p.gsc", "list gs-c200 p.gsc", "list gs-c200 p.gsc --json", "disasm gs-c200 p.img", "motor",
+        "motor qsh4218-41-10-035 --move 20", "motor qsh4218-41-10-035 --json", "table", "table --json", "size",
+        "size dcb-274",
+        "wiring", "service served.toml --user me", f"compare-moves gs-c200 S=48 S=50 {MOTOR}",
+        pytest.param(f"tune gs-c200 {MOTOR}", marks=pytest.mark.slow),
+        "terminal gs-c200",
+    ],
+)  # fmt: skip
+def test_who_has_read_enough_of_an_output_is_told_nothing(
+    line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "p.gsc").write_text("+100\n")
+    (tmp_path / "p.img").write_bytes(bytes([0x44, 1]))
+    (tmp_path / "served.toml").write_text(
+        '[units.a]\nmodel = "gs-c200"\n[lines.a]\nunits = ["a"]\nendpoint = "serial:/dev/serial/by-id/usb-a"\n'
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "stdin", io.StringIO("F\n"))
+    with open("output", "wb") as output:
+        monkeypatch.setattr(sys, "stdout", Unread(output.fileno()))
+        with pytest.raises(SystemExit) as ended:
+            main(line.split())
+    assert (ended.value.code, capsys.readouterr().err) == (1, "")
+
+
 @pytest.mark.parametrize("columns", ["0", "00", ""])
 @pytest.mark.parametrize("line", ["--help", "run --help"])
 def test_a_terminal_that_is_said_to_have_no_columns_has_as_many_as_usual(

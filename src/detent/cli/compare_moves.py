@@ -60,7 +60,7 @@ def compare_moves(
     json
         Print everything as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly, failed, of_system
+    from detent.cli.endings import asked_wrongly
     from detent.cli.rig import made, read_by, spread_of
     from detent.moves.law import winding_of
     from detent.moves.spelling import read
@@ -88,8 +88,6 @@ def compare_moves(
             _plot(plot, task, rows)
     except ValueError as error:
         asked_wrongly(error)
-    except OSError as error:
-        failed(of_system(error))
     if json:
         facts = [_facts(task, row) for row in rows]
         about = {"model": model, "motor": found.motor.name, "assumed": list(found.words), "seed": seed}

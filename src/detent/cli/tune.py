@@ -105,7 +105,7 @@ def tune(
     json
         Print everything as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly, failed, of_system, tell
+    from detent.cli.endings import asked_wrongly, tell
     from detent.cli.rig import made, read_by, spread_of
     from detent.moves.law import winding_of
     from detent.tuner import tune as tuning
@@ -168,8 +168,6 @@ def tune(
         raise SystemExit(INTERRUPTED) from None
     except ValueError as error:  # TunerError, MotorError, SettingError, CatalogueError
         asked_wrongly(error)
-    except OSError as error:
-        failed(of_system(error))
     for path in outputs if not json else ():
         if path not in left:
             print(f"Wrote {path}")
