@@ -109,7 +109,12 @@ RIG = ["--motor", "qsh4218-41-10-035", "--supply", "24", "--moves", "200"]
 NEEDING: dict[str, list[list[str]]] = {
     "distributed": [["tune", "gs-c200", *RIG, "--workers", "2"]],
     "epics": [["epics", "gs-c200"]],
-    "fast": [["tune", "gs-c200", *RIG, "--gpu"]],
+    "fast": [
+        ["tune", "gs-c200", *RIG, "--gpu"],
+        ["tune", "gs-c200", *RIG, "--fit"],
+        ["tune", "gs-c200", "--batch", "ROWS"],
+        ["compare-moves", "gs-c200", "S=48 T=603 R=201", "S=102 T=403 R=20", *RIG],
+    ],
     "figures": [
         ["run", "gs-c200", "--send", "+10", "--plot", "p.png"],
         ["demo"],
@@ -119,19 +124,23 @@ NEEDING: dict[str, list[list[str]]] = {
     ],
     "workbench": [["workbench", "gs-c200"]],
 }
-"""For each extra the commands that cannot do without. All else runs without `fast`, slowly."""
+"""For each extra the commands that cannot do without. A motor is looked at without `fast`, slowly."""
 
 
 @pytest.mark.parametrize(("extra", "words"), [(extra, words) for extra, all_ in NEEDING.items() for words in all_])
 def test_a_verb_that_needs_an_extra_says_so_in_one_line(
     extra: str, words: list[str], bare: Environment, tmp_path: Path
 ) -> None:
-    done = bare(*words, cwd=tmp_path)
-    assert done.returncode in (1, 2)
+    rows, folder = tmp_path / "rows.csv", tmp_path / "folder"
+    rows.write_text("motor,moves\nqsh4218-41-10-035,200\n")
+    folder.mkdir()
+    done = bare(*(rows if word == "ROWS" else word for word in words), cwd=folder)
+    assert done.returncode == 2
     assert done.stderr.count("\n") == 1, done.stderr
     assert f"{EXTRAS[extra]}, which is not installed: " in done.stderr
     assert f"'detent-motion[{extra}]'" in done.stderr
-    assert list(tmp_path.iterdir()) == []  # it is told before the work begins
+    assert not done.stdout
+    assert list(folder.iterdir()) == []  # it is told before the work begins
 
 
 @pytest.mark.slow

@@ -165,6 +165,7 @@ def test_steps_that_cannot_be_written_leave_the_file_alone(
         (["gs-c200", "--set", "instruction_time=1"], ""),
         (["gs-c200", "--set", "instruction_time=0"], "instruction_time cannot be '0'; it takes a duration of at least"),
         (["gs-c200", "--for", "soon"], "'soon' is no duration: write it like"),
+        (["gs-c200", "--program", ""], "--program: no file is named: write --program FILE"),
         (["gs-c200", "--program", "none.gsc"], "program: cannot read none.gsc: No such file or directory"),
         ([DRILLING, "--send", "F"], "a cell has several units, write UNIT:LINE"),
         ([DRILLING, "--send", "bra:F"], "no unit 'bra'; did you mean bar?"),

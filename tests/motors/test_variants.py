@@ -2,6 +2,7 @@
 
 import re
 from fractions import Fraction
+from itertools import pairwise
 from math import comb, floor, log10
 
 import numpy as np
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 from tests.generated import examples
 from tests.motors.moves import LARGE, SMALL, even, ramped, rig
 
-from detent.motors import chance, engine
+from detent.motors import chance, engine, variants
 from detent.motors.drive import Drive
+from detent.motors.excitation import Changes
 from detent.motors.load import Load, Profile
 from detent.motors.motor import MotorError
 from detent.motors.move import simulate
@@ -28,6 +30,7 @@ from detent.motors.variants import (
     draws,
     loss_rate,
     percent,
+    pieces,
 )
 from detent.motors.winding import HALF, microstep
 from detent.ramps.constant_acceleration import move
@@ -223,3 +226,81 @@ def test_corners_tell_settings_that_are_safe_from_others(chosen: tuple[int, int,
     steps = 5000 if chosen[0] != 1040 else 1000
     found = Ensemble(rig_, corners(SPREAD)).judge(move(*chosen, steps).train).lost
     assert int(found.sum()) == pytest.approx(lost, abs=2)
+
+
+@compiled_only
+@pytest.mark.parametrize("interpolation", [False, True])
+def test_what_is_judged_in_pieces_is_the_same_to_the_last_bit(
+    interpolation: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kernel hears no signal: it kept Ctrl-C waiting for minutes. Its work is divided, and a pause is as well."""
+    from detent.motors import lockstep
+
+    winding = microstep(8) if interpolation else HALF
+    base = Rig(SMALL, Drive(24, 1.0, winding, interpolation=interpolation), Load(3.5e-6, 0.01))
+    there = ramped(200 * winding.steps // 2, 250 * winding.steps, 3500 * winding.steps)
+    times = np.concatenate([there, there[-1] + 400_000_001 + there])
+    some, fewer = Ensemble(base, draws(WIDE, 70)), Ensemble(base, draws(SPREAD, 70))
+    hardly = Ensemble(base, np.concatenate([draws(SPREAD, 330), some.factors[some.judge(times).lost][:9]]))
+
+    def told() -> list[object]:
+        found = some.judge(times)
+        firsts = [many.survives(times) for many in (some, fewer, hardly)]
+        return [*(np.ascontiguousarray(part).tobytes() for part in found), *firsts]
+
+    monkeypatch.setattr(variants, "PIECE", 1 << 60)
+    monkeypatch.setattr(variants, "BLOCK", 1 << 60)
+    whole = told()
+    calls: list[object] = []
+    advance_all = lockstep.advance_all
+
+    def counted(*words: object) -> object:
+        calls.append(words)
+        return advance_all(*words)
+
+    monkeypatch.setattr(lockstep, "advance_all", counted)
+    for most in (3, 100, 5000):
+        monkeypatch.setattr(variants, "PIECE", 96 * most)
+        monkeypatch.setattr(variants, "BLOCK", 96 * most)
+        calls.clear()
+        assert told() == whole
+        assert len(calls) > 10
+
+
+@compiled_only
+def test_a_load_that_changes_is_judged_in_pieces_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    load = Load(3.5e-6, 0.01, torque_by_time=Profile(0.18, 0.01, (0.0, 0.12)))
+    some = Ensemble(Rig(SMALL, Drive(24, 1.0, HALF), load), draws(WIDE, 20))
+    times = np.concatenate([even(300, 200), 700_000_001 + even(50, 20)])
+    monkeypatch.setattr(variants, "PIECE", 1 << 60)
+    whole = [np.ascontiguousarray(part).tobytes() for part in some.judge(times)]
+    for most in (3, 100, 5000):
+        monkeypatch.setattr(variants, "PIECE", most)
+        assert [np.ascontiguousarray(part).tobytes() for part in some.judge(times)] == whole
+
+
+@given(
+    gaps=st.lists(st.integers(0, 90), max_size=30), behind=st.integers(0, 200), substep=st.integers(1, 9),
+    most=st.integers(1, 12),
+)  # fmt: skip
+@settings(max_examples=examples(200))
+def test_pieces_are_short_and_keep_changes_of_one_instant_together(
+    gaps: list[int], behind: int, substep: int, most: int
+) -> None:
+    times = np.cumsum(np.array(gaps, np.int64))
+    count = len(times)
+    lot = Changes(times, np.arange(count), np.ones(count), np.zeros(count, np.int64), np.zeros(count, np.int64))
+    until = (int(times[-1]) if count else 0) + behind
+    found = list(pieces([(lot, until)], 0, substep, most))
+    assert np.concatenate([part.places for part, _ in found]).tolist() == list(range(count))
+    ends = [0, *(end for _, end in found)]
+    assert ends[-1] == until
+    for (part, end), begin in zip(found, ends, strict=False):
+        assert 0 <= end - begin <= most * substep
+        assert len(set(part.times.tolist())) <= most
+        assert all(begin <= time <= end for time in part.times)
+        last = max([0, *(int(time) for time in times if time <= end)])
+        assert end in (until, last) or (end - last) % substep == 0
+    for (one, _), (other, _) in pairwise(found):
+        if len(one) and len(other):
+            assert one.times[-1] < other.times[0]

@@ -205,6 +205,27 @@ def test_a_map_has_a_rate_and_a_time_for_each_point() -> None:
         loss_map(made, point, columns=2, rows=2, variants=4, cancelled=lambda: True)
 
 
+@pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "bs0610"])
+def test_the_chosen_settings_are_a_point_of_the_map(model: str) -> None:
+    """Also at the limit of a command: they lay where there are no settings, P=62500 of a BS0610 between two rows."""
+    made = Task(model, RIG, moves_of("80"))
+    judge = judge_of(made)
+    space, hand = judge.space, judge.space.hand
+    x, y = (space.place(name) for name in space.plane)
+
+    def with_ramp(ramp: int) -> Point:
+        return space.on_plane(hand, hand[x], ramp)
+
+    highest = next(with_ramp(ramp) for ramp in range(space.dimensions[y].high, 0, -1)
+                   if space.admits(with_ramp(ramp)) and judge.time(with_ramp(ramp)) is not None)  # fmt: skip
+    for point in (hand, highest):
+        found = loss_map(made, point, columns=5, rows=4, variants=1)
+        assert found.chosen == (point[x], point[y])
+        assert found.times[found.y.index(point[y]), found.x.index(point[x])] == judge.time(point)
+        assert list(found.x) == sorted(set(found.x))
+        assert list(found.y) == sorted(set(found.y))
+
+
 def test_a_grid_is_widened_at_its_end_and_not_beyond_what_a_command_takes() -> None:
     grid = Dimension("R", 1, 999, (10, 20, 40))
     wider, added = grid.wider(40)

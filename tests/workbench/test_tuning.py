@@ -1,14 +1,24 @@
 """The search of the Motion page: beside the loop, with progress, stopped with the best so far, picked from its map."""
 
 import asyncio
+import io
+import json
+import sys
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
+from detent.motors.drive import Drive
+from detent.motors.load import Load
+from detent.motors.named import motor
+from detent.motors.rotor import Rig
+from detent.tuner.task import Task, moves_of
+from detent.workbench import tuning_process
 from detent.workbench.client import Bench
 from detent.workbench.live import Live
 from detent.workbench.moves import Axis, Moves, Place
+from detent.workbench.pipe import packed
 from detent.workbench.rigs import Form, OwnMotor
 from detent.workbench.tuning import Asked, Tuning, ranges_of
 
@@ -177,3 +187,17 @@ def test_a_move_without_the_ramp_that_was_meant_says_so() -> None:
         assert (await moves.move(axis.model_copy(update={"values": {"S": 40, "T": 60, "R": 60}})))["remark"] == ""
 
     with_bench("gs-c200", do)
+
+
+def test_a_search_that_wants_numba_says_so_on_the_page(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its process ended without a word, and the page said no more than that."""
+    task = Task("gs-c200", Rig(motor("as1010"), Drive(24, 1.0), Load()), moves_of("200"))
+    sent = io.BytesIO(packed(tuning_process.Order(task, map=False)))
+    monkeypatch.setattr(tuning_process, "_read", sent.read)
+    monkeypatch.setattr(tuning_process, "_hear", lambda stopped: None)
+    monkeypatch.setattr("os.nice", lambda more: 0)
+    monkeypatch.setitem(sys.modules, "numba", None)
+    assert tuning_process.main() == 0
+    assert "needs numba, which is not installed: " in json.loads(capsys.readouterr().out)["problem"]

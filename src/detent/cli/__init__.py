@@ -94,11 +94,15 @@ def main(tokens: Sequence[str] | None = None) -> None:
     from detent.cli import endings, overview, plain
 
     given = list(sys.argv[1:] if tokens is None else tokens)
+    plain.open_closed()
+    plain.find_columns()
     if overview.is_asked_for(given):
         try:
             overview.show(TITLE, [(name, line) for name, (_, line) in VERBS.items()], COMPLETION)
         except BrokenPipeError:
             _nobody_reads()
+        except OSError as error:  # a disk that is full
+            endings.failed(endings.of_system(error))
         sys.exit(0)
 
     from cyclopts import CycloptsError

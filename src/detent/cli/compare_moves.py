@@ -60,14 +60,14 @@ def compare_moves(
     json
         Print everything as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly, failed, of_system
+    from detent.cli.endings import asked_wrongly
     from detent.cli.rig import made, read_by, spread_of
     from detent.moves.law import winding_of
     from detent.moves.spelling import read
     from detent.outputs import figures
     from detent.outputs.files import check_outputs
     from detent.tuner.compare import compare
-    from detent.tuner.task import Task, check_rig, moves_of
+    from detent.tuner.task import Task, check_installed, check_rig, moves_of
 
     try:
         if not FEWEST <= len(settings) <= MOST:
@@ -75,6 +75,7 @@ def compare_moves(
         if plot is not None:
             figures.check(plot)
             check_outputs([plot], read_by(motor, rig), asked=overwrite)
+        check_installed()  # before a fit, which takes its time
         laws = [(text, *read(model, text.replace(";", " ").split())) for text in settings]
         windings = {winding_of(law, rig.step).name for _, law, _ in laws}
         if len(windings) > 1:
@@ -87,10 +88,6 @@ def compare_moves(
             _plot(plot, task, rows)
     except ValueError as error:
         asked_wrongly(error)
-    except ImportError as error:
-        failed(error)
-    except OSError as error:
-        failed(of_system(error))
     if json:
         facts = [_facts(task, row) for row in rows]
         about = {"model": model, "motor": found.motor.name, "assumed": list(found.words), "seed": seed}

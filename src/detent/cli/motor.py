@@ -85,7 +85,7 @@ def motor(
     json
         Print everything as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly, failed, of_system
+    from detent.cli.endings import asked_wrongly
     from detent.cli.rig import made, read_by, spread_of
     from detent.motors.motor import MotorError
 
@@ -118,10 +118,6 @@ def motor(
         _judge(asked, many, facts, sensitivity, pull_in, plot, json)
     except ValueError as error:  # MotorError, SettingError, CatalogueError
         asked_wrongly(error)
-    except ImportError as error:
-        failed(error)
-    except OSError as error:
-        failed(of_system(error))
 
 
 def _facts_of(found: Made) -> dict[str, Any]:

@@ -1,6 +1,10 @@
-"""Output for a terminal that has not all the signs we write: those it lacks are written with those it has."""
+"""Standard streams that are not what one expects: a terminal without all our signs, or without columns, or none at all.
+
+Signs that a terminal lacks are written with those it has.
+"""
 
 import codecs
+import os
 import sys
 
 SIGNS = {
@@ -13,15 +17,51 @@ SIGNS = {
 }  # fmt: skip
 
 
-def spell_out(error: UnicodeError) -> tuple[str, int]:
+def spell_out(error: UnicodeError) -> tuple[str | bytes, int]:
     """The signs that cannot be encoded, in others; ``?`` for one that has none."""
     assert isinstance(error, UnicodeEncodeError)
     return "".join(SIGNS.get(sign, "?") for sign in error.object[error.start : error.end]), error.end
 
 
+def spell_out_but_bytes(error: UnicodeError) -> tuple[str | bytes, int]:
+    """The same, but for a byte of a name that was no text: that is written as it was."""
+    assert isinstance(error, UnicodeEncodeError)
+    sign = ord(error.object[error.start])
+    if 0xDC80 <= sign <= 0xDCFF:
+        return bytes([sign - 0xDC00]), error.start + 1
+    return SIGNS.get(chr(sign), "?"), error.start + 1
+
+
+def open_closed() -> None:
+    """Standard streams that are closed (`>&-`) lead to nowhere from now on, and no file takes their place."""
+    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
+        if getattr(sys, name) is not None:
+            continue
+        nowhere = os.open(os.devnull, os.O_RDWR)  # the least number that is free
+        if nowhere > number and not _is_open(number):
+            os.dup2(nowhere, number)
+        setattr(sys, name, os.fdopen(nowhere, mode, encoding="utf-8", closefd=False))
+
+
+def _is_open(number: int) -> bool:
+    try:
+        os.fstat(number)
+    except OSError:
+        return False
+    return True
+
+
+def find_columns() -> None:
+    """A terminal that is said to have no columns says nothing: help for no columns would be written for ever."""
+    if os.environ.get("COLUMNS", "").strip().strip("0") == "":
+        os.environ.pop("COLUMNS", None)
+
+
 def make_safe() -> None:
     """Nothing that is printed from now on fails for its signs."""
     codecs.register_error("detent.plain", spell_out)
+    codecs.register_error("detent.plain.bytes", spell_out_but_bytes)
+    instead = {"strict": "detent.plain", "surrogateescape": "detent.plain.bytes"}  # the latter with LC_ALL=C
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure") and stream.errors == "strict":
-            stream.reconfigure(errors="detent.plain")
+        if hasattr(stream, "reconfigure") and stream.errors in instead:
+            stream.reconfigure(errors=instead[stream.errors])

@@ -105,22 +105,25 @@ def tune(
     json
         Print everything as one line of JSON.
     """
-    from detent.cli.endings import asked_wrongly, failed, of_system, tell
+    from detent.cli.endings import asked_wrongly, tell
     from detent.cli.rig import made, read_by, spread_of
     from detent.moves.law import winding_of
     from detent.tuner import tune as tuning
     from detent.tuner.judge import judge_of
     from detent.tuner.search import Stopped
-    from detent.tuner.task import Task, check_rig, moves_of
+    from detent.tuner.task import Task, check_installed, check_rig, moves_of
 
     try:
         if machine.on is not None:
             _on_the_machine(model, motor, moves, rig, machine, axis, json)
             return
-        _take_gpu(gpu, divided=workers is not None or scheduler is not None)
+        divided_up = workers is not None or scheduler is not None
+        _take_gpu(gpu, divided=divided_up)
         if batch is not None:
             from detent.cli.tune_batch import tune_batch
 
+            if not divided_up:  # else Workers says first what it needs itself
+                check_installed()
             tune_batch(batch, model, motor, moves, rig, _options(set_), axis, vary, seed, variants, not no_corners,
                        workers, scheduler, json)  # fmt: skip
             return
@@ -133,6 +136,8 @@ def tune(
         outputs = [*(map_ or []), *([into] if into is not None else [])]
         read = [*read_by(motor, rig), *([from_] if from_ is not None else [])]
         _check(outputs, read, map_ or [], from_, into, overwrite, each_move)
+        if not divided_up:
+            check_installed()  # before a fit, which takes its time
         asked, options = moves_of(moves), _options(set_)
         found = made(motor, rig, winding_of(_law(model, options, axis), _step(rig, model)))
         task = Task(model, check_rig(found.rig, found.motor.name), asked, options, axis, spread_of(vary), seed,
@@ -163,10 +168,6 @@ def tune(
         raise SystemExit(INTERRUPTED) from None
     except ValueError as error:  # TunerError, MotorError, SettingError, CatalogueError
         asked_wrongly(error)
-    except ImportError as error:
-        failed(error)
-    except OSError as error:
-        failed(of_system(error))
     for path in outputs if not json else ():
         if path not in left:
             print(f"Wrote {path}")

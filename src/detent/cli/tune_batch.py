@@ -28,7 +28,7 @@ def tune_batch(
     workers: int | None, scheduler: str | None, json: bool,
 ) -> None:  # fmt: skip
     """Tune each row, and print the table with what was found as it comes; with `json` a line of JSON each."""
-    from detent.cli.endings import asked_wrongly, failed, of_system
+    from detent.cli.endings import asked_wrongly
     from detent.cli.rig import made, spread_of
     from detent.moves.law import winding_of
     from detent.moves.laws import law
@@ -50,8 +50,6 @@ def tune_batch(
                 raise ValueError(f"{path}, line {number}: {error}") from None
     except ValueError as error:
         asked_wrongly(error)
-    except OSError as error:
-        failed(of_system(error))
     out = sys.stdout
     with _bar(len(tasks)) as bar:
         # a terminal that shows the bar shows the rows above it
@@ -98,7 +96,6 @@ def _bar(rows: int) -> "Iterator[Watch]":
 def _answers(tasks: "Sequence[Task]", workers: int | None, scheduler: str | None, watch: "Watch") -> "Iterator[Answer]":
     """What was found for each, in order, as it comes."""
     from detent.cli.endings import asked_wrongly, failed
-    from detent.extras import MissingExtra
     from detent.tuner.batch import answer, answers
     from detent.tuner.search import Progress
 
@@ -123,7 +120,7 @@ def _answers(tasks: "Sequence[Task]", workers: int | None, scheduler: str | None
                 yield one
         except ValueError as error:
             asked_wrongly(error)
-        except (WorkersLost, MissingExtra) as error:
+        except WorkersLost as error:
             failed(error)
 
 

@@ -1,7 +1,7 @@
 """The kernels compiled, if numba is there; as plain Python, if not.
 
 Without numba everything works and gives the same numbers, some hundred times slower: a long job is then refused with
-the remedy instead of looking dead (`check_size`).
+the remedy instead of looking dead (`check_size`). To tune is always one.
 """
 
 from functools import cache

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from detent.motors import chance, engine, gpu, kernel
-from detent.motors.excitation import Changes, Sequencer, joined
+from detent.motors.excitation import NOTHING, Changes, Sequencer, joined
 from detent.motors.motor import MotorError
 from detent.motors.move import SETTLE, Pulses, Verdict, chunks_of, extent_of, judged, parts_of
 from detent.motors.rotor import Floats, Rig, limit_of, substeps, swing_of
@@ -24,6 +24,8 @@ QUANTITIES = ("inertia", "voltage", "torque_constant", "inductance", "resistance
 UNMET = 1 << 40
 """The number of the first draw of a seed that no search asks: those that it asked prove nothing of what it found."""
 KEPT_PULSES = 1 << 22  # a train of fewer is turned into changes once, for all variants
+PIECE = 20_000_000  # substeps of lanes, some tenths of a second: while a kernel runs no signal is heard
+BLOCK = 200_000_000  # of what is not divided further, with work for many processors
 FIRST_BLOCK = 64  # lanes that `survives` looks at first
 Bools = npt.NDArray[np.bool_]
 
@@ -160,12 +162,15 @@ class Ensemble:
         """
         move, substep, first, block = _Move(self.rig, pulses, settle, begin), self.substep, 0, FIRST_BLOCK
         lanes = self._lanes()
+        each = substeps(move.until - move.begin, move.count, substep)
         while first < len(self):
             some = slice(first, first + block)
             found = _outcomes(move, self.parameters[:, some], lanes[some], substep, halt=True)
             if found.lost.any():
                 return first + int(np.argmax(found.lost))
             first, block = first + block, 2 * block
+            if not gpu.chosen(block):
+                block = max(min(block, BLOCK // each // FIRST_BLOCK * FIRST_BLOCK), FIRST_BLOCK)
         return None
 
     def _lanes(self) -> Floats:
@@ -359,6 +364,28 @@ def _rest(rig: Rig, par: Floats, loads: Floats, place: int, level: float) -> Flo
     return np.array([angle - np.arcsin(part) * np.sign(torque), none, ia, ib, none])
 
 
+def pieces(lots: Iterable[tuple[Changes, Ns]], begin: Ns, substep: Ns, most: int) -> Iterator[tuple[Changes, Ns]]:
+    """The same changes in pieces of at most `most` substeps, each with its end.
+
+    They end at a change, or at a whole substep behind the last. So the substeps are the same (decision 9).
+    """
+    now, limit = begin, most * substep
+    for changes, until in lots:
+        done = 0
+        while until - now > limit or len(changes) - done > most:
+            end = min(int(np.searchsorted(changes.times, now + limit, "right")), done + most)
+            if end > done:
+                end = int(np.searchsorted(changes.times, changes.times[end - 1], "right"))  # those of one instant
+                now = int(changes.times[end - 1])
+                yield changes.between(done, end), now
+                done = end
+            else:
+                now += limit
+                yield NOTHING, now
+        yield changes.between(done, len(changes)), until
+        now = until
+
+
 def _abreast(move: _Move, par: Floats, rest: Floats, substep: Ns, halt: bool) -> tuple[Floats, int]:
     from detent.motors import lockstep
 
@@ -370,7 +397,8 @@ def _abreast(move: _Move, par: Floats, rest: Floats, substep: Ns, halt: bool) ->
     state[lockstep.LOST_PULSE] = lockstep.NEVER_LOST
     place, level, mode, pulse, now = start.place, start.level, start.mode, 0, move.begin
     pulsed, gap, previous = move.begin - kernel.LONG_AGO, kernel.LONG_AGO, place
-    for changes, until in move.changes():
+    most = 1 << 62 if halt else max(PIECE // lanes, 1)  # halted, which of them are lost by then hangs on the lots
+    for changes, until in pieces(move.changes(), move.begin, substep, most):
         now = int(lockstep.advance_all(
             state, par, now, place, level, 0, mode, pulse, pulsed, gap, previous, *changes, until, rig.table_a,
             rig.table_b, substep, halt,
@@ -406,7 +434,7 @@ def _one_by_one(move: _Move, par: Floats, rest: Floats, loads: Floats, substep: 
         n[kernel.PULSED], n[kernel.GAP] = move.begin - kernel.LONG_AGO, kernel.LONG_AGO
         n[kernel.FROM] = start.place
         by_time, by_position = rig.by_time * loads[k], rig.by_position * loads[k]
-        for changes, until in move.changes():
+        for changes, until in pieces(move.changes(), move.begin, substep, PIECE):
             code = advance(s, n, *changes, until, rig.table_a, rig.table_b, par[:, k], by_time, by_position,
                            -np.inf, np.inf, _NO_TRACE, substep)  # fmt: skip
             if code == kernel.BROKEN:

@@ -34,12 +34,15 @@ def write_curve(
         axes = figure.add_axes((0.09, 0.13, 0.87, 0.72))
         per_step = drive.winding.steps
         rates = [point.rate * per_step for point in points]
-        axes.plot(rates, [point.torque for point in points], color=ROTOR, label="computed pull-out torque")
+        shown = [point.torque for point in points]
+        axes.plot(rates, shown, color=ROTOR, label="computed pull-out torque")
         if measured is not None and measured.winding == drive.winding.name:
             axes.plot(*zip(*measured.points, strict=True), "o", color=PHASE_B, markersize=5,
                       label=f"published: {measured.supply:g} V, {measured.current:g} A")  # fmt: skip
-        axes.axhline(motor.holding_torque, color=PALE, linestyle="--", linewidth=0.9)
-        axes.set_ylim(0, 1.2 * motor.holding_torque)
+            shown += [torque for _, torque in measured.points]
+        axes.axhline(motor.holding_torque, color=PALE, linestyle="--", linewidth=0.9, label="holding torque, rated")
+        highest = max([motor.holding_torque, *shown])  # more current than the rated one gives more
+        axes.set_ylim(0, 1.35 * highest)  # with room for the legend
         axes.set_xlim(left=0)
         label_axes(axes, f"{drive.winding.name} steps/s", "torque (Nm)")
         axes.legend(frameon=False, loc="upper right")

@@ -76,6 +76,8 @@ def write_comparison(path: Path, lines: Sequence[Line], *, title: str, about: st
             used.plot(line.times * 1e3, line.used * 100, color=colour, linewidth=1.2)
         speed.legend(frameon=False, loc="upper right")
         speed.set_ylim(bottom=0)
+        for axes in (speed, used):
+            axes.set_xlim(0, max(float(line.times[-1]) for line in lines) * 1.02e3)
         used.axhline(100, color=GREY, linewidth=0.8, linestyle="--")
         used.axhline(-100, color=GREY, linewidth=0.8, linestyle="--")
         label_axes(speed, "", "steps/s")

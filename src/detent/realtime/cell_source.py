@@ -56,6 +56,8 @@ def find_cell(
         raise Problem("", "", f"{error}; a cell file ends in .toml") from None
     if len(programs) > 1:
         raise Problem("", "--program", "one unit runs one program: give it once")
+    if "" in programs:  # of a shell whose variable is empty
+        raise Problem("", "--program", "no file is named: write --program FILE")
     description = single(
         text,
         straps=dict(_pair("--strap", item) for item in straps),

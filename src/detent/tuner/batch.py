@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from detent.extras import MissingExtra
 from detent.tuner.search import Watch, nobody, search
 from detent.tuner.task import Task
 
@@ -30,7 +31,7 @@ def answer(task: Task, watch: Watch = nobody) -> Answer:
     """The answer to a task. It hangs on the task alone."""
     try:
         found = search(task, watch=watch)
-    except ValueError as error:  # nothing moves this load, or a motor without data
+    except (ValueError, MissingExtra) as error:  # nothing moves this load, a motor without data, a bare worker
         return Answer(problem=str(error))
     check, profile = found.check, found.profile
     return Answer(str(profile), round(found.time, 9), check.lost, check.variants, check.bound, "", profile.settings,

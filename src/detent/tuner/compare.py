@@ -12,7 +12,7 @@ from detent.pulses import Train
 from detent.tuner.judge import ways_of
 from detent.tuner.quasi_static import Torque, torque_of
 from detent.tuner.search import Check
-from detent.tuner.task import Task
+from detent.tuner.task import Task, check_installed
 
 SMOOTHED = 8  # pulses either way that a speed is the mean of
 MOST_POINTS = 4000
@@ -38,7 +38,9 @@ def compare(task: Task, settings: Sequence[tuple[str, Law, Values]]) -> list[Com
     """Settings with their names, in the order given. The same draws, and all corners, judge each of them.
 
     There and back, where the load pulls to one side. Each is a look, so that all bounds hold together.
+    MissingExtra where it would take hours.
     """
+    check_installed()
     torque = torque_of(task.rig)
     rig = task.rig_with(task.rig.drive.winding, fine=True)
     corners = Ensemble(rig, task.factors(task.corners)) if task.corners else None

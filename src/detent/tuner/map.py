@@ -1,5 +1,7 @@
 """The loss rate over two settings: where moves are lost, how long they take, and where the chosen settings lie."""
 
+from collections.abc import Sequence
+from math import log
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +45,15 @@ class Map(NamedTuple):
         return "\n".join([head, *(f"{x},{y},{lost:.6g},{time:.9g}" for x, y, lost, time in self.rows())]) + "\n"
 
 
+def through(values: Sequence[int], chosen: int) -> tuple[int, ...]:
+    """Values of an axis with `chosen` in place of the one next to it.
+
+    At a limit of the controller that one may be beyond it: the chosen settings lay where there are none.
+    """
+    nearest = min(range(len(values)), key=lambda at: abs(log(max(values[at], 1) / max(chosen, 1))))
+    return (*values[:nearest], chosen, *values[nearest + 1 :])
+
+
 def loss_map(
     task: Task, point: Point, *, columns: int = COLUMNS, rows: int = ROWS, variants: int = VARIANTS,
     run: Runner = one_by_one, together: int = TOGETHER, watch: Watch = nobody, cancelled: Cancelled = never,
@@ -60,7 +71,8 @@ def loss_map(
         begin = min(dimension.values[0], point[at] / ABOUT) if at == y_at else min(dimension.values[0], point[at])
         begin = max(begin, point[at] / 8)
         end = max(min(dimension.values[-1], point[at] * 4), point[at] * 1.2)
-        axes.append(logarithmic(dimension.name, dimension.low, dimension.high, begin, end, count).values)
+        values = logarithmic(dimension.name, dimension.low, dimension.high, begin, end, count).values
+        axes.append(through(values, point[at]))
     x, y = axes
     places = [(j, i) for j in range(len(y)) for i in range(len(x))]
     lost, times = np.full((len(y), len(x)), np.nan), np.full((len(y), len(x)), np.nan)

@@ -19,7 +19,7 @@ from detent.motors.variants import percent
 from detent.tuner.grid import Dimension, points
 from detent.tuner.judge import Job, Judge, Lost, Runner, judge_of, one_by_one
 from detent.tuner.spaces import Point, Profile
-from detent.tuner.task import NOMINAL, Task, TunerError
+from detent.tuner.task import NOMINAL, Task, TunerError, check_installed
 
 AT_FIRST = 16  # draws among the counter-examples
 ADDED = 8  # losers of one look that join them
@@ -146,8 +146,9 @@ def search(
     """The fastest point that survives. `run` does the jobs, `ahead` of them at once; neither changes the answer.
 
     `cancelled` is asked between jobs; then the best so far is returned, or Stopped raised where there is none.
-    TunerError where no point survives.
+    TunerError where no point survives, MissingExtra where it would take hours.
     """
+    check_installed()
     return _Search(task, run, max(ahead, 1), watch, cancelled).whole()
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from detent.extras import need
 from detent.motors.motor import MotorError
 from detent.motors.rotor import FINE, SUBSTEP, Floats, Rig
 from detent.motors.variants import SPREAD, Ensemble, Spread, corners, draws
@@ -31,6 +32,11 @@ class Move(NamedTuple):
 
     steps: int
     weight: float = 1.0
+
+
+def check_installed() -> None:
+    """Raise MissingExtra without numba: moves are judged by the thousand, for which plain Python would take hours."""
+    need("fast", "to tune and to compare moves needs")
 
 
 def moves_of(text: str) -> tuple[Move, ...]:

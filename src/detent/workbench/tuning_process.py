@@ -13,6 +13,7 @@ import threading
 import time
 from typing import Any, NamedTuple
 
+from detent.extras import MissingExtra
 from detent.motors import gpu
 from detent.tuner.map import loss_map
 from detent.tuner.report import facts, fails_words, models_words, option_lines
@@ -105,7 +106,7 @@ def main() -> int:
         os.nice(5)  # the cell and its pages go first
     try:
         search(order, stopped)
-    except ValueError as error:  # TunerError, MotorError
+    except (ValueError, MissingExtra) as error:  # TunerError, MotorError
         say(problem=str(error))
     return 0
 
