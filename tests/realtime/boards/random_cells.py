@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping
+from itertools import pairwise
 from random import Random
 
 from tests.realtime.boards.driven_bench import Bench
@@ -17,6 +18,8 @@ LINES = {
     "dcb-274": "+{n} -{n} M{r} M-{r} M0 F{r},0 F{r},1 @ \x1b Z0 R{n} R-{n} | H{h} H{h} Y{s},{k}",
 }
 """What a host may say to each kind."""
+SELECTS = [(1, 1, 1), (0, 1, 1), (1, 0, 1), (0, 0, 1), (1, 1, 0), (0, 1, 0), (1, 0, 0)]
+"""SEL2, SEL1, SEL0 of modules on one line, the first of them alone."""
 
 
 class RandomCell:
@@ -26,11 +29,17 @@ class RandomCell:
     `driven_bench.Bench` takes them; `hands` are the other inputs. Every input rests where it is 1.
     """
 
-    def __init__(self, random: Random, *, most_boards: int = 2, chips: bool = True, rich: bool = False) -> None:
-        """`chips`: drivers may be some. `rich`: clocks of their own for each direction, chips by SPI, programs."""
-        self._random, self._chips, self._rich = random, chips, rich
+    def __init__(
+        self, random: Random, *, most_boards: int = 2, chips: bool = True, rich: bool = False, large: bool = False
+    ) -> None:
+        """`chips`: drivers may be some. `rich`: clocks of their own for each direction, chips by SPI, programs.
+
+        `large`: three to six units on up to four boards, those of one kind on one line or each on its own.
+        """
+        self._random, self._chips, self._rich, self._large = random, chips, rich, large
         self.files: dict[str, str] = {}  # programs, by their names in the cell file
-        self.boards = "ab"[: random.choice([1, 1, 2])][:most_boards]
+        self.boards = "abcd"[: random.choice([1, 2, 3, 4])] if large else "ab"[: random.choice([1, 1, 2])][:most_boards]
+        self._common = large and random.random() < 0.5  # lines
         self.lead = random.choice([5, 10, 30, 60])
         self.replies = random.choice(["held", "held", "held", "at once"])
         self.units: list[tuple[str, str]] = []
@@ -44,7 +53,7 @@ class RandomCell:
             "gs-c200s": self._gsc200, "bs0610": self._genstepper, "supersigma": self._supersigma,
             "dcb-274": self._dcb274,
         }  # fmt: skip
-        for name in "xyz"[: random.choice([1, 1, 2, 2, 3])]:
+        for name in "uvwxyz"[: random.choice([3, 4, 5, 6])] if large else "xyz"[: random.choice([1, 1, 2, 2, 3])]:
             model = random.choice(["gs-c200s", "gs-c200s", "bs0610", "supersigma", "dcb-274"])
             self.units.append((name, model))
             make[model](name)
@@ -99,15 +108,18 @@ class RandomCell:
         return [unit for unit, model in self.units if model == "dcb-274"]
 
     def _lines(self) -> None:
-        party = self._party()
-        if len(party) > 1:
-            self.text += f"[lines.bus]\nunits = {party}\n"
-            for unit, model in self.units:
-                if model != "dcb-274":
-                    self.text += f'[lines.to_{unit}]\nunits = ["{unit}"]\n'
+        kinds = ("dcb-274", "gs-c200s", "supersigma") if self._common else ("dcb-274",)
+        groups = [[unit for unit, model in self.units if model == kind] for kind in kinds]
+        shared = {kind: units for kind, units in zip(kinds, groups, strict=True) if len(units) > 1}
+        for number, units in enumerate(shared.values()):
+            self.text += f"[lines.bus{number or ''}]\nunits = {units}\n"
+        for unit, model in self.units if shared else ():
+            if model not in shared:
+                self.text += f'[lines.to_{unit}]\nunits = ["{unit}"]\n'
         modules = [unit for unit, model in self.units if model == "gs-c200s"]
-        if len(modules) > 1 and self._random.random() < 0.3:
-            self.text += f'[[wires]]\nfrom = "{modules[0]}.UO1"\nto = "{modules[1]}.UI2"\n'
+        for one, other in pairwise(modules if self._large else modules[:2]):
+            if self._random.random() < 0.3:
+                self.text += f'[[wires]]\nfrom = "{one}.UO1"\nto = "{other}.UI2"\n'
 
     def _pin(self, board: str) -> str:
         self._pins[board] += 1
@@ -166,7 +178,9 @@ class RandomCell:
 
     def _gsc200(self, unit: str) -> None:
         random, board = self._random, self._random.choice(self.boards)
-        more, separate = 'straps = { CHS = "low" }\n', self._rich and random.random() < 0.4
+        selects = SELECTS[len(self.units) if self._common else 0]
+        more = 'straps = {{ CHS = "low", SEL2 = {}, SEL1 = {}, SEL0 = {} }}\n'.format(*selects)
+        separate = self._rich and random.random() < 0.4
         if separate:
             more += 'options = { clock = "separate" }\n'
         if self._rich and random.random() < 0.5:
@@ -199,7 +213,7 @@ class RandomCell:
 
     def _supersigma(self, unit: str) -> None:
         board, end = self._random.choice(self.boards), self._random.randrange(30, 400)
-        self._unit(unit, "supersigma", board)
+        self._unit(unit, "supersigma", board, f"options = {{ number = {len(self.units) if self._common else 1} }}\n")
         self._motor(unit, board, "supersigma")
         self._outputs(board, "P23")
         self._inputs(unit, board, "FORCE", "RAIL", axis=unit, places={"RAIL": (-FAR, -end // 8 - 2)})
