@@ -59,6 +59,7 @@ class Session:
             ticks = 0, (1 << 31) - 1000, (1 << 32) - 50_000_000, random.randrange(1 << 36)
             boards["first_tick"] = random.choice(ticks)
             boards["window"] = random.choice([None, 128, 192])
+            boards["pins"] = 128
         spoil = lossy(Random(random.random()), self.loss) if self.loss else None
         line_timing = self.rich and random.random() < 0.5
         return Bench(
