@@ -229,3 +229,22 @@ def test_a_movement_of_a_ccu_that_is_lost_is_told(nth: int) -> None:
             return
         places = [place + step for place, step in zip(places, wanted.values(), strict=True)]
         assert positions(cell) == places
+
+
+@pytest.mark.parametrize("distances", [(50, -50, 20), (30, 30, -30), (100, 33, 0)])
+def test_a_movement_of_a_straight_line_that_is_lost_is_told(distances: tuple[int, ...]) -> None:
+    """Whichever write does not come, out or back: a line that returns has been made."""
+    nth, whole = 0, False
+    while not whole:
+        nth += 1
+        cell, _ = robot(switches=False)
+        port = Damaging(cell, nth, None)
+        ccu = BlockingCcu(Ccu(), port)
+        try:
+            for way in (1, -1):
+                ccu.move_line({drive: way * steps for drive, steps in enumerate(distances, 1)})
+                assert positions(cell) == [max(way, 0) * steps for steps in distances]
+        except DriverError:
+            assert port.writes >= nth
+        whole = port.writes < nth
+    assert nth > 10

@@ -336,22 +336,30 @@ class Ccu(BusDriver):
         drives = [drive for drive, count in steps.items() if count]
         for drive in drives:
             message(drive, CONSTANT, steps[drive], speed)
+        before = {}
         for drive in drives:
-            yield from self._ready(drive)
+            before[drive] = (yield from self._ready(drive)).steps
         limit = together([steps[drive] for drive in drives], fastest) * UNIT
         try:
             if limit > LOW:
+                began = self._at
                 yield Ask(b"".join(message(drive, LIMIT, steps[drive], limit) for drive in drives))
+                for drive in drives:
+                    if before[drive] == abs(steps[drive]):
+                        yield from self._seen(drive, began + before[drive] / limit)
                 self._made((yield from self.wait_for(*drives)), steps)
             else:
-                yield from self._follow(drives, line([steps[drive] for drive in drives], fastest))
+                yield from self._follow(drives, line([steps[drive] for drive in drives], fastest), before)
         except DriverError:
             for drive in drives:
                 yield from attempt(self._stopped(drive, STOP))
             raise
 
-    def _follow(self, drives: Sequence[int], runs: Sequence[Run]) -> Steps[None]:
-        """Send each movement of a line at its time, when the one before of its drive has ended; wait for the last."""
+    def _follow(self, drives: Sequence[int], runs: Sequence[Run], before: Mapping[int, int]) -> Steps[None]:
+        """Send each movement of a line at its time, when the one before of its drive has ended; wait for the last.
+
+        One of as many steps as the one `before` is looked at on its way, where the bus has time for a question.
+        """
         commands = [message(drives[run.axis], CONSTANT, run.steps, run.speed * UNIT) for run in runs]
         first = sum(run.at == place * MESSAGE for place, run in enumerate(runs[: len(drives)]))
         began = self._at + MESSAGE / CLOCK_HZ
@@ -359,15 +367,31 @@ class Ccu(BusDriver):
         yield Ask(b"".join(commands[:first]))
         self._at += first * MESSAGE / CLOCK_HZ
         made = {run.axis: abs(run.steps) for run in runs[:first]}
+        unsure = [run for run in runs[:first] if before[drives[run.axis]] == abs(run.steps)]
         for run, command in zip(runs[first:], commands[first:], strict=True):
-            yield Rest(max(began + (run.at - EXCHANGE) / CLOCK_HZ - self._at, 0.0))
+            ask_at = began + (run.at - EXCHANGE) / CLOCK_HZ
+            while unsure and self._at + MESSAGE / CLOCK_HZ <= ask_at:
+                other = unsure.pop()
+                yield from self._seen(drives[other.axis], began + other.end / CLOCK_HZ)
+            yield Rest(max(ask_at - self._at, 0.0))
             yield from self._ended(drives[run.axis], made[run.axis])
             yield Ask(command)
+            if made[run.axis] == abs(run.steps):
+                unsure.append(run)
             made[run.axis] = abs(run.steps)
             _check(drives[runs[0].axis], (yield from self._status(drives[runs[0].axis])))
+        for other in reversed(unsure):
+            yield from self._seen(drives[other.axis], began + other.end / CLOCK_HZ)
         yield Rest(max(began + max((run.end for run in runs), default=0) / CLOCK_HZ - self._at, 0.0))
         for axis, steps in made.items():
             yield from self._ended(drives[axis], steps)
+
+    def _seen(self, drive: int, end: float) -> Steps[None]:
+        """See that a drive moves whose movement lasts until `end` at least. Raises DriveFailed."""
+        report = yield from self._status(drive)
+        _check(drive, report)
+        if self._at < end:
+            _begun(drive, report)
 
     def _ended(self, drive: int, steps: int) -> Steps[None]:
         """See that the movement of a drive has ended, which it should have by now. Raises DriveFailed."""
