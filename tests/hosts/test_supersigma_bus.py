@@ -192,6 +192,48 @@ def test_a_question_that_is_damaged_in_a_movement_costs_no_step_of_the_position(
     assert drive.position() == positions(cell)[0] == 6000
 
 
+class Misheard(HostPort):
+    """In what is heard at the `nth` time one bit is wrong."""
+
+    def __init__(self, cell: Cell, nth: int, bit: int) -> None:
+        super().__init__(cell)
+        self.nth, self.bit, self.times = nth, bit, 0
+
+    def receive(self, timeout: float) -> bytes:
+        data = super().receive(timeout)
+        self.times += bool(data)
+        if not data or self.times != self.nth:
+            return data
+        return bytes([data[0] ^ 1 << self.bit]) + data[1:]
+
+
+@pytest.mark.parametrize("bit", range(8))
+def test_an_answer_that_is_damaged_is_told_or_leaves_no_trace_in_the_position(bit: int) -> None:
+    """An answer has no checksum. Nothing of it stays, and no call that returns has brought the drive elsewhere."""
+    nth, whole = 0, False
+    while not whole:
+        nth += 1
+        cell, _ = robot()
+        port = Misheard(cell, nth, bit)
+        drive, told = BlockingSupersigma(Supersigma(1), port), ""
+        try:
+            drive.home()
+            drive.wait()
+            for steps in (20, -20, 10):
+                drive.move_by(steps)
+                drive.wait()
+        except DriverError as error:
+            assert port.times >= nth
+            told = str(error)
+        else:
+            assert positions(cell)[0] == 10
+        cell.run_to(cell.now + 10 * SECOND)
+        # an answer that was thrown away is asked for again behind a silence, when a short movement is over
+        assert "if it did move" in told or drive.position() == positions(cell)[0]
+        whole = port.times < nth
+    assert nth > 30
+
+
 @pytest.mark.parametrize("kind", ["drive", "ccu"])
 def test_an_origin_that_was_found_before_is_none_that_was_found_now(kind: str) -> None:
     """Origination, "upon reception of a particular command": where that is lost the flag is of the search before."""

@@ -87,7 +87,9 @@ class BusDriver(Driver):
         """
         searches = data[1] == ORIGINATE
         if before.originated if searches else before.steps == int.from_bytes(data[2:4], "big"):
-            return (yield from self._status(drive, data))
+            report = yield from self._status(drive, data)
+            # an answer has no checksum: that it does not move is asked for twice
+            return report if report.moving else (yield from self._status(drive))
         yield Ask(data)
         return None
 

@@ -29,6 +29,7 @@ from detent.hosts.microbus import (
 )
 
 # The curve of the paper, V = 15000 sin^2(4.54426 t + 0.2097) half steps/s: where ramps begin, and where they end.
+AGAIN = 3  # times that a status is asked for until it is told twice
 AWAITED = 50  # times that a drive is asked whether a movement has ended that should have
 LOW, TOP, _RATE, _PHASE = 650, 15_000, 4.54426, 0.2097
 
@@ -74,6 +75,8 @@ class Supersigma(Axis, BusDriver):
         report = yield from self._status(self.drive)
         if not self._direction:
             return report
+        if not report.moving and report.steps != self._wanted:
+            report = yield from self._confirmed(report)
         # not so by the flag of a refusal: a question that was damaged sets it, too
         before = self._before
         other = report.steps != before.steps or report.originated != before.originated
@@ -82,6 +85,15 @@ class Supersigma(Axis, BusDriver):
             if self._heard:  # else the steps are those of the movement before
                 self._from = self._place(report)
             self._direction = 0
+        return report
+
+    def _confirmed(self, report: Report) -> Steps[Report]:
+        """What status says twice: an answer has no checksum, and what is damaged would stay in the position."""
+        for _ in range(AGAIN):
+            again = yield from self._status(self.drive)
+            if again == report:
+                break
+            report = again
         return report
 
     @operation
@@ -432,8 +444,8 @@ def _begun(drive: int, report: Report | None) -> bool:
     if report is None:
         return False
     if not report.moving:
-        what = "refused a command" if report.refused else "was not seen to move: a message was lost on the bus"
-        raise DriveFailed(drive, what, report)
+        what = "was not seen to move: a message was lost on the bus; if it did move: originate()"
+        raise DriveFailed(drive, "refused a command" if report.refused else what, report)
     return True
 
 
