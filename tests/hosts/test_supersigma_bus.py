@@ -9,11 +9,31 @@ from hypothesis import strategies as st
 from tests.generated import examples
 from tests.hosts.test_supersigma_cells import positions, robot
 
+from detent.cell.cell import Cell
 from detent.cell.faults import OnLine
+from detent.cell.host import HostPort
 from detent.hosts.errors import DriverError, MotionFailed
 from detent.hosts.supersigma import BlockingCcu, BlockingSupersigma, Ccu, Supersigma
 from detent.lines.faults import UNITS, LostCharacters
 from detent.ticks import MS, SECOND, US
+
+
+class Damaging(HostPort):
+    """Write number `nth` does not reach the bus, or comes to it as another: bit `bit` is wrong."""
+
+    def __init__(self, cell: Cell, nth: int, bit: int | None) -> None:
+        super().__init__(cell)
+        self.nth, self.bit, self.writes = nth, bit, 0
+
+    def write(self, data: bytes) -> int:
+        self.writes += 1
+        if self.writes == self.nth:
+            if self.bit is None:
+                return len(data)
+            place, bit = divmod(self.bit, 8)
+            data = data[:place] + bytes([data[place] ^ 1 << bit]) + data[place + 1 :]
+        return super().write(data)
+
 
 GARBAGE = st.lists(st.sampled_from([0, 1, 2, 3, 5, 0x81, 0x83, 0xFF]) | st.integers(0, 255), max_size=9).map(bytes)
 MOVES = st.lists(st.tuples(st.integers(1, 3), st.integers(-30, 30).filter(bool)), min_size=1, max_size=4)
@@ -141,3 +161,132 @@ def test_a_byte_that_is_lost_is_told_or_made_good(nth: int) -> None:
     stood = positions(cell)
     cell.run_to(cell.now + 10 * SECOND)
     assert positions(cell) == stood
+
+
+@pytest.mark.parametrize("nth", range(1, 17))
+@pytest.mark.parametrize("bit", [None, *range(2, 8)], ids=lambda bit: "lost" if bit is None else f"to {1 ^ 1 << bit}")
+def test_a_message_that_no_drive_takes_is_told_or_made_good(nth: int, bit: int | None) -> None:
+    """Lost, or to a drive that is not there: status reads as if a movement of as many steps had been made (Status)."""
+    cell, _ = robot(switches=False)
+    drive = BlockingSupersigma(Supersigma(1), Damaging(cell, nth, bit))
+    for steps in (20, -20, 20, 20):
+        before = drive.position()
+        try:
+            drive.move(steps)
+            drive.wait()
+        except DriverError:
+            assert drive.position() == positions(cell)[0] == before
+        else:
+            assert drive.position() == positions(cell)[0] == before + steps
+
+
+@pytest.mark.parametrize("bit", [11, 12, 13, 14])
+@pytest.mark.parametrize("nth", range(3, 9))
+def test_a_question_that_is_damaged_in_a_movement_costs_no_step_of_the_position(nth: int, bit: int) -> None:
+    """The question comes as an op-code that there is not, and leaves the flag of a refusal at a drive that moves."""
+    cell, _ = robot(switches=False)
+    drive = BlockingSupersigma(Supersigma(1), Damaging(cell, nth, bit))
+    drive.move(6000)
+    with pytest.raises(MotionFailed, match="refused a command"):
+        drive.wait()
+    assert drive.position() == positions(cell)[0] == 6000
+
+
+class Misheard(HostPort):
+    """In what is heard at the `nth` time one bit is wrong."""
+
+    def __init__(self, cell: Cell, nth: int, bit: int) -> None:
+        super().__init__(cell)
+        self.nth, self.bit, self.times = nth, bit, 0
+
+    def receive(self, timeout: float) -> bytes:
+        data = super().receive(timeout)
+        self.times += bool(data)
+        if not data or self.times != self.nth:
+            return data
+        return bytes([data[0] ^ 1 << self.bit]) + data[1:]
+
+
+@pytest.mark.parametrize("bit", range(8))
+def test_an_answer_that_is_damaged_is_told_or_leaves_no_trace_in_the_position(bit: int) -> None:
+    """An answer has no checksum. Nothing of it stays, and no call that returns has brought the drive elsewhere."""
+    nth, whole = 0, False
+    while not whole:
+        nth += 1
+        cell, _ = robot()
+        port = Misheard(cell, nth, bit)
+        drive, told = BlockingSupersigma(Supersigma(1), port), ""
+        try:
+            drive.home()
+            drive.wait()
+            for steps in (20, -20, 10):
+                drive.move_by(steps)
+                drive.wait()
+        except DriverError as error:
+            assert port.times >= nth
+            told = str(error)
+        else:
+            assert positions(cell)[0] == 10
+        cell.run_to(cell.now + 10 * SECOND)
+        # an answer that was thrown away is asked for again behind a silence, when a short movement is over
+        assert "if it did move" in told or drive.position() == positions(cell)[0]
+        whole = port.times < nth
+    assert nth > 30
+
+
+@pytest.mark.parametrize("kind", ["drive", "ccu"])
+def test_an_origin_that_was_found_before_is_none_that_was_found_now(kind: str) -> None:
+    """Origination, "upon reception of a particular command": where that is lost the flag is of the search before."""
+    cell, port = robot()
+    made = BlockingSupersigma(Supersigma(1), port) if kind == "drive" else BlockingCcu(Ccu(), port)
+
+    def search() -> None:
+        if isinstance(made, BlockingSupersigma):
+            made.home()
+            made.wait()
+        else:
+            made.originate_all([1])
+
+    search()
+    BlockingSupersigma(Supersigma(1), port).move(300)
+    cell.run_to(cell.now + SECOND)
+    made.port = Damaging(cell, 2, None)
+    with pytest.raises(MotionFailed, match="drive 1: was not seen to move"):
+        search()
+    search()
+    assert cell.controller("m1").status(cell.now).position == 0
+
+
+@pytest.mark.parametrize("nth", range(1, 20))
+def test_a_movement_of_a_ccu_that_is_lost_is_told(nth: int) -> None:
+    cell, port = robot(switches=False)
+    ccu = BlockingCcu(Ccu(), port)
+    ccu.port = Damaging(cell, nth, None)
+    places = [0, 0, 0]
+    for steps in (20, -20, 30, -30):  # pick, place
+        wanted = {1: steps, 2: -steps, 3: 2 * steps}
+        try:
+            ccu.move_all(wanted)
+        except DriverError:
+            return
+        places = [place + step for place, step in zip(places, wanted.values(), strict=True)]
+        assert positions(cell) == places
+
+
+@pytest.mark.parametrize("distances", [(50, -50, 20), (30, 30, -30), (100, 33, 0)])
+def test_a_movement_of_a_straight_line_that_is_lost_is_told(distances: tuple[int, ...]) -> None:
+    """Whichever write does not come, out or back: a line that returns has been made."""
+    nth, whole = 0, False
+    while not whole:
+        nth += 1
+        cell, _ = robot(switches=False)
+        port = Damaging(cell, nth, None)
+        ccu = BlockingCcu(Ccu(), port)
+        try:
+            for way in (1, -1):
+                ccu.move_line({drive: way * steps for drive, steps in enumerate(distances, 1)})
+                assert positions(cell) == [max(way, 0) * steps for steps in distances]
+        except DriverError:
+            assert port.writes >= nth
+        whole = port.writes < nth
+    assert nth > 10

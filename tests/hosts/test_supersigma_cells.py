@@ -88,8 +88,12 @@ def check_straight(cell: Cell, distances: tuple[int, ...]) -> None:
 )
 def test_a_line_of_several_axes_is_straight_to_less_than_a_step_pulse_by_pulse(distances: tuple[int, ...]) -> None:
     cell, port = robot(switches=False)
-    BlockingCcu(Ccu(), port).move_line(dict(enumerate(distances, 1)))
+    ccu = BlockingCcu(Ccu(), port)
+    ccu.move_line(dict(enumerate(distances, 1)))
     assert positions(cell) == list(distances)
+    # back, with more questions, as the drives have made as many steps before
+    ccu.move_line(dict(enumerate((-distance for distance in distances), 1)))
+    assert positions(cell) == [0] * len(distances)
     check_straight(cell, distances)
 
 

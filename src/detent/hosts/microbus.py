@@ -6,7 +6,8 @@ message when no byte has come for `SILENCE` seconds (docs/controllers/supersigma
 
 - keeps silent for so long before its first message, and behind every question that was not answered;
 - asks before it lets a drive move: whoever answers is in step;
-- says a stop at once, and once more when the drive has answered: then it is heard for certain.
+- says a stop at once, and once more when the drive has answered: then it is heard for certain;
+- asks in the same breath as it lets a drive move, where status would read the same if the drive had not heard it.
 
 Filling the gap with bytes instead would not do: whatever they are, they could be the steps of a movement.
 """
@@ -77,12 +78,27 @@ class BusDriver(Driver):
         yield Pause(SILENCE)
         self._in_step = True
 
-    def _status(self, drive: int) -> Steps[Report]:
+    def _start(self, drive: int, data: bytes, before: Report) -> Steps[Report | None]:
+        """Tell a drive that is at rest, with the status `before`, to make the movement `data`.
+
+        A movement of as many steps as the one before, and a search behind one that has found the origin, end with the
+        status that there is already. Then the drive is asked as well, in the same write: its answer begins 0.1 ms after
+        the movement, which is under way then. Returned is that answer; None where the end of the movement tells.
+        """
+        searches = data[1] == ORIGINATE
+        if before.originated if searches else before.steps == int.from_bytes(data[2:4], "big"):
+            report = yield from self._status(drive, data)
+            # an answer has no checksum: that it does not move is asked for twice
+            return report if report.moving else (yield from self._status(drive))
+        yield Ask(data)
+        return None
+
+    def _status(self, drive: int, first: bytes = b"") -> Steps[Report]:
         """Status of a drive, asked again behind a silence if it is not answered. Raises NoAnswer, BadAnswer.
 
-        A late answer to an earlier question is not taken for it.
+        A late answer to an earlier question is not taken for it. `first` is said before the question, once.
         """
-        data, more = message(drive, STATUS), b""
+        data, more = first + message(drive, STATUS), b""
         if not self._in_step:
             yield from self._silent()
             more = b"?"  # who is there is not known yet
@@ -101,6 +117,7 @@ class BusDriver(Driver):
                 self._at = answer.at
                 return Report(int.from_bytes(answer.data[:2], "big"), answer.data[2])
             self._in_step = False
+            data = message(drive, STATUS)
             if left:
                 yield from self._silent()
                 more = b"?"

@@ -29,6 +29,7 @@ from detent.hosts.microbus import (
 )
 
 # The curve of the paper, V = 15000 sin^2(4.54426 t + 0.2097) half steps/s: where ramps begin, and where they end.
+AGAIN = 3  # times that a status is asked for until it is told twice
 AWAITED = 50  # times that a drive is asked whether a movement has ended that should have
 LOW, TOP, _RATE, _PHASE = 650, 15_000, 4.54426, 0.2097
 
@@ -46,7 +47,8 @@ class Supersigma(Axis, BusDriver):
 
     A drive does not count positions. The driver does, from the steps that status reports of each movement, and knows
     of no other movements: if somebody else moves the drive, a second host or a `Ccu` on the same port, the position
-    is wrong until the next `home` or `set_position`.
+    is wrong until the next `home` or `set_position`. What begins a movement raises DriveFailed as well where nothing
+    else would tell that the drive has not heard it.
     """
 
     fastest = TOP
@@ -59,6 +61,8 @@ class Supersigma(Axis, BusDriver):
         self._limit: int | None = None  # of moves with ramps, half steps/s
         self._from = 0  # where the movement that is accounted for began, or the drive stands
         self._direction = 0  # of that movement; 0: there is none
+        self._before = Report(0, 0)  # status before it was begun
+        self._heard = False  # the drive is known to have begun it
         self._last = 0  # direction of the last movement
         self._originating = False
         self._wanted: int | None = None  # steps of the movement under way, as long as nobody stops it
@@ -69,10 +73,27 @@ class Supersigma(Axis, BusDriver):
     def status(self) -> Steps[Report]:
         """Steps of the last movement or of the one under way, and flags. Raises NoAnswer."""
         report = yield from self._status(self.drive)
-        if self._direction and not report.moving:
-            if not report.refused:  # then the steps are those of the movement before
+        if not self._direction:
+            return report
+        if not report.moving and report.steps != self._wanted:
+            report = yield from self._confirmed(report)
+        # not so by the flag of a refusal: a question that was damaged sets it, too
+        before = self._before
+        other = report.steps != before.steps or report.originated != before.originated
+        self._heard = self._heard or report.moving or other
+        if not report.moving:
+            if self._heard:  # else the steps are those of the movement before
                 self._from = self._place(report)
             self._direction = 0
+        return report
+
+    def _confirmed(self, report: Report) -> Steps[Report]:
+        """What status says twice: an answer has no checksum, and what is damaged would stay in the position."""
+        for _ in range(AGAIN):
+            again = yield from self._status(self.drive)
+            if again == report:
+                break
+            report = again
         return report
 
     @operation
@@ -97,7 +118,6 @@ class Supersigma(Axis, BusDriver):
     def originate(self) -> Steps[None]:
         """Begin the search for the origin, backward to the end of the rail. It is position 0. Raises Busy."""
         yield from self._begin(message(self.drive, ORIGINATE), -1)
-        self._originating, self._wanted = True, None
 
     @operation
     def emergency(self) -> Steps[None]:
@@ -107,11 +127,18 @@ class Supersigma(Axis, BusDriver):
 
     def _begin(self, data: bytes, steps: int) -> Steps[None]:
         """A drive refuses to begin while it moves, and tells only when it is asked: it is asked first."""
-        if (yield from self.status()).moving:
+        before = yield from self.status()
+        if before.moving:
             raise self._busy()
-        yield Ask(data)
+        self._before, self._heard = before, False
         self._direction = self._last = 1 if steps > 0 else -1
-        self._originating, self._wanted = False, abs(steps)
+        self._originating, self._wanted = data[1] == ORIGINATE, None
+        told = yield from self._start(self.drive, data, before)
+        if told is not None and not told.moving:
+            self._direction = 0
+        self._heard = _begun(self.drive, told)
+        if not self._originating:
+            self._wanted = abs(steps)
 
     def _busy(self) -> Busy:
         return Busy(self.title, "moves", advice="wait() for its end, or stop() it")
@@ -220,7 +247,10 @@ class Supersigma(Axis, BusDriver):
 
 
 class Ccu(BusDriver):
-    """The drives of one MICROBUS together: each call names the drive or the drives. It keeps no positions."""
+    """The drives of one MICROBUS together: each call names the drive or the drives. It keeps no positions.
+
+    What begins a movement raises DriveFailed as well where nothing else would tell that a drive has not heard it.
+    """
 
     title = "CCU"
 
@@ -262,8 +292,8 @@ class Ccu(BusDriver):
 
     def _begin(self, drive: int, data: bytes) -> Steps[None]:
         """Whoever is to move is asked first: it is at rest and in step with us then."""
-        yield from self._ready(drive)
-        yield Ask(data)
+        before = yield from self._ready(drive)
+        _begun(drive, (yield from self._start(drive, data, before)))
 
     # -- several drives ----------------------------------------------------------------------------------
 
@@ -318,22 +348,30 @@ class Ccu(BusDriver):
         drives = [drive for drive, count in steps.items() if count]
         for drive in drives:
             message(drive, CONSTANT, steps[drive], speed)
+        before = {}
         for drive in drives:
-            yield from self._ready(drive)
+            before[drive] = (yield from self._ready(drive)).steps
         limit = together([steps[drive] for drive in drives], fastest) * UNIT
         try:
             if limit > LOW:
+                began = self._at
                 yield Ask(b"".join(message(drive, LIMIT, steps[drive], limit) for drive in drives))
+                for drive in drives:
+                    if before[drive] == abs(steps[drive]):
+                        yield from self._seen(drive, began + before[drive] / limit)
                 self._made((yield from self.wait_for(*drives)), steps)
             else:
-                yield from self._follow(drives, line([steps[drive] for drive in drives], fastest))
+                yield from self._follow(drives, line([steps[drive] for drive in drives], fastest), before)
         except DriverError:
             for drive in drives:
                 yield from attempt(self._stopped(drive, STOP))
             raise
 
-    def _follow(self, drives: Sequence[int], runs: Sequence[Run]) -> Steps[None]:
-        """Send each movement of a line at its time, when the one before of its drive has ended; wait for the last."""
+    def _follow(self, drives: Sequence[int], runs: Sequence[Run], before: Mapping[int, int]) -> Steps[None]:
+        """Send each movement of a line at its time, when the one before of its drive has ended; wait for the last.
+
+        One of as many steps as the one `before` is looked at on its way, where the bus has time for a question.
+        """
         commands = [message(drives[run.axis], CONSTANT, run.steps, run.speed * UNIT) for run in runs]
         first = sum(run.at == place * MESSAGE for place, run in enumerate(runs[: len(drives)]))
         began = self._at + MESSAGE / CLOCK_HZ
@@ -341,15 +379,31 @@ class Ccu(BusDriver):
         yield Ask(b"".join(commands[:first]))
         self._at += first * MESSAGE / CLOCK_HZ
         made = {run.axis: abs(run.steps) for run in runs[:first]}
+        unsure = [run for run in runs[:first] if before[drives[run.axis]] == abs(run.steps)]
         for run, command in zip(runs[first:], commands[first:], strict=True):
-            yield Rest(max(began + (run.at - EXCHANGE) / CLOCK_HZ - self._at, 0.0))
+            ask_at = began + (run.at - EXCHANGE) / CLOCK_HZ
+            while unsure and self._at + MESSAGE / CLOCK_HZ <= ask_at:
+                other = unsure.pop()
+                yield from self._seen(drives[other.axis], began + other.end / CLOCK_HZ)
+            yield Rest(max(ask_at - self._at, 0.0))
             yield from self._ended(drives[run.axis], made[run.axis])
             yield Ask(command)
+            if made[run.axis] == abs(run.steps):
+                unsure.append(run)
             made[run.axis] = abs(run.steps)
             _check(drives[runs[0].axis], (yield from self._status(drives[runs[0].axis])))
+        for other in reversed(unsure):
+            yield from self._seen(drives[other.axis], began + other.end / CLOCK_HZ)
         yield Rest(max(began + max((run.end for run in runs), default=0) / CLOCK_HZ - self._at, 0.0))
         for axis, steps in made.items():
             yield from self._ended(drives[axis], steps)
+
+    def _seen(self, drive: int, end: float) -> Steps[None]:
+        """See that a drive moves whose movement lasts until `end` at least. Raises DriveFailed."""
+        report = yield from self._status(drive)
+        _check(drive, report)
+        if self._at < end:
+            _begun(drive, report)
 
     def _ended(self, drive: int, steps: int) -> Steps[None]:
         """See that the movement of a drive has ended, which it should have by now. Raises DriveFailed."""
@@ -364,10 +418,11 @@ class Ccu(BusDriver):
     def _all(self, steps: Mapping[int, int], start: Callable[[int], bytes]) -> Steps[dict[int, Report]]:
         drives = [drive for drive, count in steps.items() if count]
         data = [start(drive) for drive in drives]
+        before = {}
         for drive in drives:
-            yield from self._ready(drive)
-        for one in data:
-            yield Ask(one)
+            before[drive] = yield from self._ready(drive)
+        for drive, one in zip(drives, data, strict=True):
+            _begun(drive, (yield from self._start(drive, one, before[drive])))
         return (yield from self.wait_for(*drives))
 
     def _made(self, reports: Mapping[int, Report], steps: Mapping[int, int]) -> dict[int, Report]:
@@ -382,6 +437,16 @@ def _move(drive: int, steps: int, limit: int | None) -> bytes:
     if limit is None:
         return message(drive, MOVE, steps)
     return message(drive, CONSTANT if limit < LOW else LIMIT, steps, limit)
+
+
+def _begun(drive: int, report: Report | None) -> bool:
+    """Whether `report`, asked for with the movement, is there and shows it. Raises DriveFailed where it shows none."""
+    if report is None:
+        return False
+    if not report.moving:
+        what = "was not seen to move: a message was lost on the bus; if it did move: originate()"
+        raise DriveFailed(drive, "refused a command" if report.refused else what, report)
+    return True
 
 
 def _check(drive: int, report: Report, steps: int | None = None) -> None:

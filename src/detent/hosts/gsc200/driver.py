@@ -82,12 +82,12 @@ class GsC200(Commands):
     @operation
     def stop(self) -> Steps[None]:
         """Ramp down and stand (Z); a program ends. Nothing happens if the axis stands already."""
-        yield from self.zero_speed()
+        yield from self._stopped(self.zero_speed())
 
     @operation
     def halt(self) -> Steps[None]:
         """Stop at once, without a ramp (K); a program ends."""
-        yield from self.kill()
+        yield from self._stopped(self.kill())
 
     @operation
     def home(self, direction: int = -1) -> Steps[None]:
@@ -167,11 +167,21 @@ class GsC200(Commands):
         if both * speeds.seconds < 2 * ramp:
             ramp = max(round(both * speeds.seconds / 2), language.RAMPS[0])
         self._commanded()
+        for command in (f"S{start}", f"T{slew}", f"R{ramp}"):
+            self.frames.frame(command)  # one that cannot be sent leaves the others as they were
         yield from self.set_start_stop(10 * start)
         yield from self._set_top(slew)
         yield from self.set_ramp(ramp)
         self._slew = slew
         return Speeds(10 * start, 10 * slew, 2 * ramp / both if slew > start else 0.0)
+
+    def _stopped(self, told: Steps[None]) -> Steps[None]:
+        """Say a stop. A module in programming mode, where nothing moves, refuses it (E4); F tells that it stands."""
+        try:
+            yield from told
+        except Refused as error:
+            if error.code != "E4" or (yield from self._asked()).busy:
+                raise
 
     def _above(self, position: int) -> Steps[None]:
         """Raise Refused where a homing that was cut off has taken the counter below 0."""
@@ -217,7 +227,7 @@ class GsC200(Commands):
         starts the program; `save` may come before. Raises ValueError for a line that cannot be stored, before
         anything is sent.
         """
-        program = language.program(self.model, lines)
+        program = self._sendable(lines)
         stored = yield from self._begin(program)
         for number in range(stored, len(program)):
             yield Progress(number, len(program), "instructions")
@@ -230,6 +240,16 @@ class GsC200(Commands):
             yield from self.leave_programming()
         elif not program:
             yield from self.execute()  # nothing is there to be started
+
+    def _sendable(self, lines: Sequence[str]) -> list[str]:
+        """The lines of a program as Q lists them. ValueError names the line that cannot be stored, or not be sent."""
+        program = language.program(self.model, lines)
+        for number, text in enumerate(program, 1):
+            try:
+                self.frames.frame(text)
+            except ValueError as error:
+                raise ValueError(f"line {number}: {error}") from None
+        return program
 
     def _begin(self, program: list[str]) -> Steps[int]:
         """Enter programming mode; how many instructions of `program` are there already.
@@ -376,7 +396,7 @@ class GsC200(Commands):
             if not isinstance(lines, Sequence) or isinstance(lines, str):
                 raise ValueError(f"{key}: it must be a list of instructions, one a line")
             try:
-                programs.append(language.program(self.model, [str(line) for line in lines]))
+                programs.append(self._sendable([str(line) for line in lines]))
             except ValueError as error:
                 raise ValueError(f"{key}: {error}") from None
         if not self.signed:
