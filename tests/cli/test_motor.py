@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 
 from detent.cli import main
-from detent.motors.named import MOTORS
+from detent.motors.drive import Drive
+from detent.motors.load import Load
+from detent.motors.move import simulate
+from detent.motors.named import MOTORS, motor
+from detent.motors.rotor import FINE, Rig
+from detent.moves.laws import law
 from detent.realtime import texts
 
 
@@ -85,6 +90,24 @@ def test_a_move_may_be_that_of_a_controller(capsys: pytest.CaptureFixture[str]) 
     assert "as dcb-274 I=800 V=6000 K=7,5" in said(
         capsys, "as1010", "--move", "500", "--as", "dcb-274", "I=800", "V=6000", "K=7,5", "--variants", "0"
     )
+
+
+@pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "supersigma", "bs0610"])
+def test_the_step_of_a_controller_is_its_own_whether_it_is_named_or_not(
+    model: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """H of a DCB-274 and O of a board have currents of their own (DCB-274 manual, page 40; BS0610 manual, page 30)."""
+    controller = law(model)
+    words = ["as1010", "--move", "320", "--variants", "0", "--json", "--as", model]
+    usual = json.loads(said(capsys, *words))
+    for winding in controller.windings:
+        named = json.loads(said(capsys, *words, "--step", winding.name))
+        assert named["step"] == winding.name
+        rig = Rig(motor("as1010"), Drive(24, motor("as1010").current, winding), Load(motor("as1010").rotor), FINE)
+        verdict = simulate(controller.train(controller.values, 320), rig).verdict
+        assert named["verdict"]["load_angle"] == verdict.load_angle
+        if winding == controller.windings[0]:
+            assert named == usual
 
 
 def test_a_motor_of_ones_own_with_its_curve_and_its_mechanics(

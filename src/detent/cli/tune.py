@@ -139,7 +139,7 @@ def tune(
         if not divided_up:
             check_installed()  # before a fit, which takes its time
         asked, options = moves_of(moves), _options(set_)
-        found = made(motor, rig, winding_of(_law(model, options, axis), _step(rig, model)))
+        found = made(motor, rig, winding_of(_law(model, options, axis), step_of(rig, model)))
         task = Task(model, check_rig(found.rig, found.motor.name), asked, options, axis, spread_of(vary), seed,
                     not no_corners, final=variants)  # fmt: skip
         if into is not None:
@@ -234,7 +234,7 @@ def _law(model: str, options: dict[str, object], axis: str) -> Any:
     return law(model, options, axis)
 
 
-def _step(rig: RigOptions, model: str) -> str | None:
+def step_of(rig: RigOptions, model: str) -> str | None:
     """The stepping asked for. ValueError where that is a setting of the controller."""
     if rig.step is not None and model.lower().startswith("bs0") and rig.step not in ("O0", "O1", "O2"):
         raise ValueError(f"--step {rig.step}: the step size of a {model} is an option: --set step_size=4 is 1/16; "
