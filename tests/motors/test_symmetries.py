@@ -13,6 +13,7 @@ from detent.motors.motor import Motor
 from detent.motors.move import Part, Run, simulate
 from detent.motors.named import motor
 from detent.motors.rotor import Rig
+from detent.motors.variants import SPREAD, Ensemble, draws, judge
 from detent.motors.winding import HALF
 from detent.pulses import Train, Uniform
 from detent.ticks import MS
@@ -107,3 +108,22 @@ def test_more_inertia_more_friction_less_voltage_never_help_a_hard_start(which: 
 
     assert [lost(1, inertia) for inertia in (0.0, 8.0)] == [False, True]
     assert [lost(voltage, 0.2) for voltage in (1.0, 0.3)] == [False, True]
+
+
+@pytest.mark.parametrize("inertia", [1e-5, 1e-3, 3e-2])
+@pytest.mark.parametrize("friction", [0.0, 0.02])
+def test_no_verdict_hangs_on_how_long_a_rotor_gets_to_settle(inertia: float, friction: float) -> None:
+    """Constant speeds, left at once: a heavy rotor has hardly begun to swing when a light one stands."""
+    one = Rig(SMALL, Drive(24, 1.0, HALF), Load(inertia=inertia, friction=friction))
+    natural = SMALL.natural_frequency(inertia)
+    variants = Ensemble(one, draws(SPREAD, 32))
+    lost = set()
+    for octaves in range(-4, 21):
+        times = even(natural * 2 ** (octaves / 4), 24)
+        soon, late = simulate(times, one).verdict, simulate(times, one, settle=8 * one.settle).verdict
+        assert soon.lost == late.lost, (octaves, str(soon), str(late))
+        assert judge(times, [one])[0].lost == soon.lost
+        both = [variants.judge(times, settle=settle).lost for settle in (None, 8 * one.settle)]
+        assert np.array_equal(*both), octaves
+        lost.add(soon.lost)
+    assert lost == {False, True}

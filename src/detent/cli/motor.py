@@ -379,7 +379,7 @@ class _Variants(NamedTuple):
         if self.tried == 0:
             return None, "variants: none asked for"
         tried = VARIANTS if self.tried is None else self.tried
-        seconds = (move.train.duration or 0) * 1e-9
+        seconds = ((move.train.duration or 0) + move.rig.settle) * 1e-9
         work = seconds * (tried + len(corners(self.spread.of(move.rig))))
         most = MOST_SIMULATED if move.rig.load.is_steady else MOST_SIMULATED / 10
         if self.tried is None and (work > most or not engine.fast()):
@@ -396,7 +396,7 @@ def _judge(
 
     duration = move.train.duration
     assert duration is not None
-    _warn_of_waiting(duration * 1e-9)
+    _warn_of_waiting((duration + move.rig.settle) * 1e-9)
     run = simulate(move.train, move.rig, sample=max(duration // 20_000, 1) if plot is not None else None)
     verdict = run.verdict
     loss = diagnose(move.train, move.rig) if verdict.lost else None
@@ -450,8 +450,8 @@ def _warn_of_waiting(seconds: float) -> None:
 
     if seconds > LONGEST:
         raise MotorError(
-            f"a move of {seconds:.0f} s takes too long to compute, and at constant speed nothing new happens: judge a "
-            f"shorter one, of at most {LONGEST:.0f} s"
+            f"a move of {seconds:.0f} s, with its time to settle, takes too long to compute, and at constant speed "
+            f"nothing new happens: judge a shorter one, of at most {LONGEST:.0f} s"
         )
     wait = seconds / SIMULATED
     if wait > 4 and engine.fast() and sys.stderr.isatty():

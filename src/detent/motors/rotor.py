@@ -14,10 +14,12 @@ from detent.motors.excitation import Changes, Sequencer
 from detent.motors.load import NO_LOAD, Load
 from detent.motors.motor import Motor, MotorError, Shared
 from detent.motors.winding import Winding
-from detent.ticks import US, Ns
+from detent.ticks import MS, SECOND, US, Ns
 
 SUBSTEP: Ns = 20 * US
 FINE: Ns = 10 * US  # for verdicts that are printed
+SETTLE: Ns = 40 * MS
+SWINGS = 3  # that a heavy rotor, which swings more slowly, gets to settle
 
 Floats = npt.NDArray[np.float64]
 
@@ -57,6 +59,18 @@ class Rig(Shared):
         if self.drive.decay != "voltage":
             return self.drive.current
         return self.drive.volts / (self.motor.resistance + self.drive.resistance)
+
+    @property
+    def settle(self) -> Ns:
+        """How long after the last pulse it is looked at: it has come to rest by then, or has left its place for good.
+
+        A rotor that is too fast to be held leaves within a swing; one that swings slowly is still about its place after
+        `SETTLE`, whatever becomes of it.
+        """
+        motor = self.motor
+        stiffness = motor.teeth * motor.torque_constant * self.drive.current  # with one phase on
+        swing = 2 * pi * sqrt((motor.rotor + self.load.inertia) / stiffness)
+        return max(SETTLE, ceil(SWINGS * swing * SECOND))
 
     def __post_init__(self) -> None:
         motor, drive, load = self.motor, self.drive, self.load
