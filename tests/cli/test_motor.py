@@ -140,6 +140,17 @@ def test_a_file_that_is_not_there_is_named(tokens: list[str], capsys: pytest.Cap
     assert capsys.readouterr().err == f"detent: {tokens[-1]}: No such file or directory\n"
 
 
+@pytest.mark.parametrize("inertia", [1.0, 30.0, 1e3])
+def test_a_load_that_is_far_too_heavy_is_no_speed_that_nobody_gave(
+    inertia: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["qsh4218-41-10-035", "--inertia", f"{inertia:g}"]
+    told = said(capsys, *words, "--pull-in")
+    assert "into no speed of 40 steps/s or more" in told
+    assert "up to 0 steps/s" not in told
+    assert "steps lost after pulse" in said(capsys, *words, "--move", "20", "--slew", "100", "--variants", "0")
+
+
 def test_a_small_inertia_is_a_number_like_others(capsys: pytest.CaptureFixture[str]) -> None:
     words = ("23-305-ds8a-series", "--supply", "40", "--inertia", "1e-5")
     assert "Starts without a ramp" in said(capsys, *words, "--pull-in")
@@ -166,6 +177,7 @@ def test_pull_in_tells_the_start_stop_speed_and_the_holes_of_resonance(capsys: p
         (["as1010", "--move", "1000.5"], "a whole number, 1 to"),
         (["as1010", "--move", "nan"], "a whole number, 1 to"),
         (["as1010", "--move", "100", "--slew", "nan"], "whole steps/s"),
+        (["as1010", "--inertia", "680000", "--move", "100"], "check the unit"),
         (["as1010", "--move", "100", "--slew", "50", "--start", "100"], "is below --start"),
         (["as1010", "--supply", "1e9"], "at most 1000"),
         (["as1010", "--supply", "nan"], "supply is nan"),

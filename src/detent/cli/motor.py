@@ -249,7 +249,15 @@ def _pull_in(found: Made) -> dict[str, Any]:
 
 
 def _print_pull_in(found: Made, facts: dict[str, Any]) -> None:
-    print(f"\nStarts without a ramp into up to {facts['highest_start']:.0f} steps/s; a common rule takes half of it.")
+    from detent.motors.curve import SLOWEST_START
+
+    if not facts["highest_start"]:
+        lowest = SLOWEST_START * found.drive.winding.steps
+        print(f"\nStarts without a ramp into no speed of {lowest:g} steps/s or more: too heavy a load for it, or too "
+              f"much friction; a ramp may do it (resonance at {_resonance(_rig(found)):.3g} steps/s).")  # fmt: skip
+    else:
+        print(f"\nStarts without a ramp into up to {facts['highest_start']:.0f} steps/s; a common rule takes half of "
+              "it.")  # fmt: skip
     if facts["holes"]:
         bands = ", ".join(f"{low:.0f}-{high:.0f}" for low, high in facts["holes"])
         print(f"Resonance loses steps at {bands} steps/s: friction damps it, and so does a finer step.")
@@ -352,7 +360,7 @@ def _default_start(rig: "Rig", slew: int) -> int:
     resonance, per_step = _resonance(rig), rig.drive.winding.steps
     for part in (2.0, 1.5):
         rate = round(part * resonance)
-        if rate < slew and starts(rig, [rate / per_step], steps=20).started[0]:
+        if 1 <= rate < slew and starts(rig, [rate / per_step], steps=20).started[0]:
             return rate
     return max(min(round(resonance / 8), slew), 1)
 

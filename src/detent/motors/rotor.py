@@ -19,6 +19,7 @@ from detent.ticks import MS, SECOND, US, Ns
 SUBSTEP: Ns = 20 * US
 FINE: Ns = 10 * US  # for verdicts that are printed
 SETTLE: Ns = 40 * MS
+MOST_SWING = 600.0  # s: nothing that a step motor moves swings more slowly
 SWINGS = 3  # that a heavy rotor, which swings more slowly, gets to settle
 
 Floats = npt.NDArray[np.float64]
@@ -67,10 +68,14 @@ class Rig(Shared):
         A rotor that is too fast to be held leaves within a swing; one that swings slowly is still about its place after
         `SETTLE`, whatever becomes of it.
         """
+        return max(SETTLE, ceil(SWINGS * self._swing * SECOND))
+
+    @property
+    def _swing(self) -> float:
+        """Seconds of a small swing about a place with one phase on."""
         motor = self.motor
-        stiffness = motor.teeth * motor.torque_constant * self.drive.current  # with one phase on
-        swing = 2 * pi * sqrt((motor.rotor + self.load.inertia) / stiffness)
-        return max(SETTLE, ceil(SWINGS * swing * SECOND))
+        stiffness = motor.teeth * motor.torque_constant * self.drive.current
+        return 2 * pi * sqrt((motor.rotor + self.load.inertia) / stiffness)
 
     def __post_init__(self) -> None:
         motor, drive, load = self.motor, self.drive, self.load
@@ -85,6 +90,11 @@ class Rig(Shared):
             raise MotorError(
                 f"motor {motor.name}: L / R of {motor.real_inductance / resistance:.2g} s, or the inertia of "
                 f"{inertia:.2g} kg m2, is too small to be a motor's: check the units (H, kg m2)"
+            )
+        if self._swing > MOST_SWING:
+            raise MotorError(
+                f"an inertia of {inertia:.3g} kg m2 is too large for {motor.name}, on which it swings once in "
+                f"{self._swing:.3g} s: check the unit (1 g cm2 is 1e-7 kg m2), or give a gear"
             )
         set_ = object.__setattr__
         if self.damping is None:
