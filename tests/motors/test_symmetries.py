@@ -14,7 +14,7 @@ from detent.motors.move import Part, Run, simulate
 from detent.motors.named import motor
 from detent.motors.rotor import Rig
 from detent.motors.variants import SPREAD, Ensemble, draws, judge
-from detent.motors.winding import HALF
+from detent.motors.winding import FULL, HALF, Winding, microstep
 from detent.pulses import Train, Uniform
 from detent.ticks import MS
 
@@ -66,6 +66,23 @@ def test_backwards_is_the_mirror_of_forwards() -> None:
     backward = simulate([Part(train, -1)], rig(), sample=0)
     assert path(backward) == pytest.approx(-path(forward), abs=1e-9)
     assert backward.verdict.load_angle == pytest.approx(forward.verdict.load_angle, abs=1e-7)
+
+
+@pytest.mark.parametrize("winding", [FULL, HALF, microstep(4)], ids=lambda winding: winding.name)
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_where_the_electrical_angle_is_counted_from_makes_no_difference(winding: Winding, quarters: int) -> None:
+    """By full steps, as the supply limits each phase. A load by place is counted from where the rotor stood."""
+    a, b = winding.a, winding.b
+    for _ in range(quarters):
+        a, b = tuple(-value for value in b), a
+    other = Winding("turned", winding.steps, a, b, winding.offset + quarters * np.pi / 2)
+    load = Load(inertia=7e-6, friction=0.03, torque_by_position=Profile(0.0, 0.02, (0.0, 0.05, 0.1, 0.05, 0.0, 0.1)))
+    times = even(60 * winding.steps, 16 * winding.steps)
+    once, again = (Rig(SMALL, Drive(24, 1.0, table), load) for table in (winding, other))
+    one, two = simulate(times, once, sample=0), simulate(times, again, sample=0)
+    assert path(two) == pytest.approx(path(one), abs=1e-6)
+    assert two.verdict.lost is one.verdict.lost is False
+    assert judge(times, [again])[0].load_angle == pytest.approx(one.verdict.load_angle, abs=1e-3)
 
 
 def test_four_full_steps_further_everything_is_the_same() -> None:

@@ -112,6 +112,7 @@ class Rig(Shared):
         par[kernel.GAIN] = resistance
         par[kernel.T_START], par[kernel.T_STEP] = load.torque_by_time[:2]
         par[kernel.P_START], par[kernel.P_STEP] = load.torque_by_position[:2]
+        par[kernel.P_START] += winding.offset / motor.teeth  # the kernel counts from electrical angle 0
         torque = motor.torque_constant * sqrt(2) * drive.current
         par[kernel.DAMPING] = 2 * self.damping.ratio * sqrt(motor.teeth * torque * motor.rotor)
         par[kernel.ROLL_OFF] = self.damping.roll_off * 2 * pi / motor.steps
