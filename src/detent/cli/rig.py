@@ -281,6 +281,14 @@ def _ring_down(rig: "Rig", text: str) -> Any:
     return ring_down.from_overshoot(rig, *numbers)
 
 
+def step_of(rig: RigOptions, model: str) -> str | None:
+    """The stepping asked for. ValueError where that is a setting of the controller."""
+    if rig.step is not None and model.lower().startswith("bs0") and rig.step not in ("O0", "O1", "O2"):
+        raise ValueError(f"--step {rig.step}: the step size of a {model} is an option: --set step_size=4 is 1/16; "
+                         "what --step takes is its step mode: O0, O1, O2")  # fmt: skip
+    return rig.step
+
+
 def read_by(name: str, options: RigOptions) -> list[Path]:
     """Every file that a motor and its options are read from: no output may go there."""
     from detent.motors import own

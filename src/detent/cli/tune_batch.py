@@ -29,8 +29,7 @@ def tune_batch(
 ) -> None:  # fmt: skip
     """Tune each row, and print the table with what was found as it comes; with `json` a line of JSON each."""
     from detent.cli.endings import asked_wrongly
-    from detent.cli.rig import made, spread_of
-    from detent.cli.tune import step_of
+    from detent.cli.rig import made, spread_of, step_of
     from detent.moves.law import winding_of
     from detent.moves.laws import law
     from detent.tuner.task import Task, check_rig, moves_of
