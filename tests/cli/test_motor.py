@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 
 from detent.cli import main
-from detent.motors.named import MOTORS
+from detent.motors.drive import Drive
+from detent.motors.load import Load
+from detent.motors.move import simulate
+from detent.motors.named import MOTORS, motor
+from detent.motors.rotor import FINE, Rig
+from detent.moves.laws import law
 from detent.realtime import texts
 
 
@@ -87,6 +92,24 @@ def test_a_move_may_be_that_of_a_controller(capsys: pytest.CaptureFixture[str]) 
     )
 
 
+@pytest.mark.parametrize("model", ["gs-c200", "dcb-274", "supersigma", "bs0610"])
+def test_the_step_of_a_controller_is_its_own_whether_it_is_named_or_not(
+    model: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """H of a DCB-274 and O of a board have currents of their own (DCB-274 manual, page 40; BS0610 manual, page 30)."""
+    controller = law(model)
+    words = ["as1010", "--move", "320", "--variants", "0", "--json", "--as", model]
+    usual = json.loads(said(capsys, *words))
+    for winding in controller.windings:
+        named = json.loads(said(capsys, *words, "--step", winding.name))
+        assert named["step"] == winding.name
+        rig = Rig(motor("as1010"), Drive(24, motor("as1010").current, winding), Load(motor("as1010").rotor), FINE)
+        verdict = simulate(controller.train(controller.values, 320), rig).verdict
+        assert named["verdict"]["load_angle"] == verdict.load_angle
+        if winding == controller.windings[0]:
+            assert named == usual
+
+
 def test_a_motor_of_ones_own_with_its_curve_and_its_mechanics(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -117,6 +140,17 @@ def test_a_file_that_is_not_there_is_named(tokens: list[str], capsys: pytest.Cap
     assert capsys.readouterr().err == f"detent: {tokens[-1]}: No such file or directory\n"
 
 
+@pytest.mark.parametrize("inertia", [1.0, 30.0, 1e3])
+def test_a_load_that_is_far_too_heavy_is_no_speed_that_nobody_gave(
+    inertia: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["qsh4218-41-10-035", "--inertia", f"{inertia:g}"]
+    told = said(capsys, *words, "--pull-in")
+    assert "into no speed of 40 steps/s or more" in told
+    assert "up to 0 steps/s" not in told
+    assert "steps lost after pulse" in said(capsys, *words, "--move", "20", "--slew", "100", "--variants", "0")
+
+
 def test_a_small_inertia_is_a_number_like_others(capsys: pytest.CaptureFixture[str]) -> None:
     words = ("23-305-ds8a-series", "--supply", "40", "--inertia", "1e-5")
     assert "Starts without a ramp" in said(capsys, *words, "--pull-in")
@@ -143,6 +177,7 @@ def test_pull_in_tells_the_start_stop_speed_and_the_holes_of_resonance(capsys: p
         (["as1010", "--move", "1000.5"], "a whole number, 1 to"),
         (["as1010", "--move", "nan"], "a whole number, 1 to"),
         (["as1010", "--move", "100", "--slew", "nan"], "whole steps/s"),
+        (["as1010", "--inertia", "680000", "--move", "100"], "check the unit"),
         (["as1010", "--move", "100", "--slew", "50", "--start", "100"], "is below --start"),
         (["as1010", "--supply", "1e9"], "at most 1000"),
         (["as1010", "--supply", "nan"], "supply is nan"),

@@ -14,6 +14,8 @@ import pytest
 from detent.cli import main
 from detent.cli import tune as verb
 from detent.motors import chance
+from detent.motors.winding import DCB_274, Winding
+from detent.tuner import batch as batching
 from detent.tuner import tune as tuning
 from detent.tuner.judge import Job, Judge, Lost
 from detent.tuner.search import Progress
@@ -152,6 +154,27 @@ def test_a_batch_answers_row_by_row_and_a_row_without_answer_says_why(
     assert [row["settings"] for row in table] == [found["settings"], ""]
     assert table[1]["problem"] == none["problem"]
     assert [row["looks"] for row in table] == [str(found["looks"]), ""]
+
+
+def test_a_row_of_a_batch_may_name_the_step_of_its_controller(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The currents of that step are the controller's, and what it does not do is told with its line."""
+
+    def known(task: Task, _: object) -> batching.Answer:
+        asked.append(task.rig.drive.winding)
+        return batching.Answer()
+
+    asked: list[Winding] = []
+    monkeypatch.setattr(batching, "answer", known)
+    rows = tmp_path / "machines.csv"
+    words = ["tune", "dcb-274", "--batch", str(rows), *RIG, "--moves", "60", "--no-gpu"]
+    rows.write_text("supply,step\n24,\n24,1/4\n24,half\n")
+    run(capsys, *words)
+    quarter, half = DCB_274[1], DCB_274[2]
+    assert asked == [quarter, quarter, half]
+    rows.write_text("supply,step\n24,\n24,1/16\n")
+    assert "line 3: a dcb-274 does no '1/16'; there are: 1/4," in run(capsys, *words, code=2)
 
 
 def test_processes_that_share_the_work_take_no_gpu(capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,7 +13,8 @@ from detent.motors.motor import Motor
 from detent.motors.move import Part, Run, simulate
 from detent.motors.named import motor
 from detent.motors.rotor import Rig
-from detent.motors.winding import HALF
+from detent.motors.variants import SPREAD, Ensemble, draws, judge
+from detent.motors.winding import FULL, HALF, Winding, microstep
 from detent.pulses import Train, Uniform
 from detent.ticks import MS
 
@@ -67,6 +68,23 @@ def test_backwards_is_the_mirror_of_forwards() -> None:
     assert backward.verdict.load_angle == pytest.approx(forward.verdict.load_angle, abs=1e-7)
 
 
+@pytest.mark.parametrize("winding", [FULL, HALF, microstep(4)], ids=lambda winding: winding.name)
+@pytest.mark.parametrize("quarters", [1, 2, 3])
+def test_where_the_electrical_angle_is_counted_from_makes_no_difference(winding: Winding, quarters: int) -> None:
+    """By full steps, as the supply limits each phase. A load by place is counted from where the rotor stood."""
+    a, b = winding.a, winding.b
+    for _ in range(quarters):
+        a, b = tuple(-value for value in b), a
+    other = Winding("turned", winding.steps, a, b, winding.offset + quarters * np.pi / 2)
+    load = Load(inertia=7e-6, friction=0.03, torque_by_position=Profile(0.0, 0.02, (0.0, 0.05, 0.1, 0.05, 0.0, 0.1)))
+    times = even(60 * winding.steps, 16 * winding.steps)
+    once, again = (Rig(SMALL, Drive(24, 1.0, table), load) for table in (winding, other))
+    one, two = simulate(times, once, sample=0), simulate(times, again, sample=0)
+    assert path(two) == pytest.approx(path(one), abs=1e-6)
+    assert two.verdict.lost is one.verdict.lost is False
+    assert judge(times, [again])[0].load_angle == pytest.approx(one.verdict.load_angle, abs=1e-3)
+
+
 def test_four_full_steps_further_everything_is_the_same() -> None:
     there = Train((Uniform.at_rate(0, 200, 8),))
     later = Train((Uniform.at_rate(0, 700, 100),), start=(1 << 60) * 400 * MS)
@@ -107,3 +125,22 @@ def test_more_inertia_more_friction_less_voltage_never_help_a_hard_start(which: 
 
     assert [lost(1, inertia) for inertia in (0.0, 8.0)] == [False, True]
     assert [lost(voltage, 0.2) for voltage in (1.0, 0.3)] == [False, True]
+
+
+@pytest.mark.parametrize("inertia", [1e-5, 1e-3, 3e-2])
+@pytest.mark.parametrize("friction", [0.0, 0.02])
+def test_no_verdict_hangs_on_how_long_a_rotor_gets_to_settle(inertia: float, friction: float) -> None:
+    """Constant speeds, left at once: a heavy rotor has hardly begun to swing when a light one stands."""
+    one = Rig(SMALL, Drive(24, 1.0, HALF), Load(inertia=inertia, friction=friction))
+    natural = SMALL.natural_frequency(inertia)
+    variants = Ensemble(one, draws(SPREAD, 32))
+    lost = set()
+    for octaves in range(-4, 21):
+        times = even(natural * 2 ** (octaves / 4), 24)
+        soon, late = simulate(times, one).verdict, simulate(times, one, settle=8 * one.settle).verdict
+        assert soon.lost == late.lost, (octaves, str(soon), str(late))
+        assert judge(times, [one])[0].lost == soon.lost
+        both = [variants.judge(times, settle=settle).lost for settle in (None, 8 * one.settle)]
+        assert np.array_equal(*both), octaves
+        lost.add(soon.lost)
+    assert lost == {False, True}

@@ -38,3 +38,17 @@ def test_a_comparison_begins_with_its_moves(monkeypatch: pytest.MonkeyPatch) -> 
         begin, end = axes.get_xlim()
         assert begin == 0
         assert end > 3000
+
+
+@pytest.mark.parametrize("words", [3, 12, 30, 90])
+@pytest.mark.parametrize("panels", [1, 2])
+def test_no_heading_runs_out_of_its_picture_or_into_the_panels(words: int, panels: int) -> None:
+    """A reason why steps are lost is as long as it is, and a map may be of 32 moves."""
+    about = " ".join(["swings grow"] * words)
+    figure, axes = motor_figures.blank(" ".join(["qsh4218"] * min(words, 40)), about, panels)
+    assert " ".join(figure.texts[1].get_text().split()) == about
+    for text in figure.texts:
+        box = text.get_window_extent()
+        assert box.x1 <= figure.bbox.width
+        assert box.y0 > axes[-1].get_window_extent().y1
+    assert figure.texts[1].get_fontsize() == 10 or words > 20

@@ -14,7 +14,7 @@ from detent.motors.rotor import Rig
 from detent.tuner.grid import Dimension
 from detent.tuner.judge import Job, Judge, Lost, judge_of
 from detent.tuner.map import loss_map
-from detent.tuner.search import Progress, Stopped, grid_points, search
+from detent.tuner.search import Found, Progress, Stopped, grid_points, search
 from detent.tuner.spaces import Point, Space, space
 from detent.tuner.task import NOMINAL, Move, Task, TunerError, moves_of
 from detent.tuner.tune import tune
@@ -157,6 +157,53 @@ def test_a_search_that_is_stopped_says_what_it_has() -> None:
     assert "no fresh ones yet" in str(stopped.check)
     with pytest.raises(Stopped):
         search(made, run=Planted(24), cancelled=lambda: True)
+
+
+class Rare(Planted):
+    """One more: the shorter its ramps, the more variants a point loses, each point others, and no corner."""
+
+    def answer(self, job: Job) -> Lost:
+        *_, ramp = job.point
+        lost = tuple(one for one in job.variants if one >= 128 and hash((job.point, one)) % 1000 < 4000 / ramp**2)
+        return lost if job.to_the_end else lost[:1]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_stopped_search_has_survives_all_that_others_lost_and_is_not_forgotten(seed: int) -> None:
+    """Stopped at each of its jobs in turn."""
+
+    def until(job: int) -> Found:
+        left = [job]
+
+        def cancelled() -> bool:
+            left[0] -= 1
+            return left[0] < 0
+
+        made = task(refined=False, screened=64, final=512, seed=seed)
+        coarse(made).space = dense
+        return search(made, run=Rare(0), cancelled=cancelled)
+
+    ramps = tuple(range(12 + seed, 120, 5))
+    start, slew, ramp = whole_space().dimensions
+    dense = whole_space()._replace(dimensions=(
+        start._replace(values=(90,)), slew._replace(values=(400, 420)), ramp._replace(values=ramps)
+    ))  # fmt: skip
+    whole = until(1 << 30)
+    assert whole.check.looks > 1  # a final look was lost on the way
+    runner, kept, job = Rare(0), [], 0
+    while True:
+        job += 1
+        try:
+            found = until(job)
+        except Stopped:
+            assert not any(not runner.answer(Job(point, whole.examples)) for point in kept), job
+            continue
+        if found.whole:
+            break
+        assert not runner.answer(Job(found.point, found.examples)), job
+        assert found.check.met == len(found.examples)
+        kept.append(found.point)
+    assert len(set(kept)) > 1
 
 
 def test_progress_counts_up_to_what_it_said() -> None:

@@ -163,3 +163,23 @@ def test_a_board_whose_slope_is_the_limit_has_settings_all_the_same(size: str) -
     every = points([one.values[::2] for one in found.dimensions])
     profiles = [found.profile(point) for point in every if found.admits(point)]
     assert sum(profile is not None for profile in profiles) >= 5
+
+
+@pytest.mark.parametrize("mode", [0, 1, 2, 3])
+@pytest.mark.parametrize("axis", ["X", "Y"])
+def test_a_reset_that_sets_the_step_size_leaves_the_step_mode_that_is_judged(axis: str, mode: int) -> None:
+    """Manual, page 37: `!` sets everything as after power-on, and so O to 3."""
+    made_of = law("bs0610", {}, axis)
+    winding = made_of.windings[0] if mode == 3 else next(one for one in made_of.windings if one.name == f"O{mode}")
+    rig = Rig(motor("qsh4218-41-10-035"), Drive(24, 1.0, winding), LOAD)
+    judge = Judge(Task("bs0610", rig, moves_of("192"), axis=axis))
+    found = judge.trains(judge.space.hand)
+    assert found is not None
+    profile = found[0]
+    assert profile.settings[0].endswith("!")
+    unit = build(parse('[units.unit]\nmodel = "bs0610"\n', "cell"), lambda _: "", line_timing=False)
+    for line in (axis, f"{mode}O", *profile.settings):
+        unit.type("unit", line)
+        rest(unit)
+    assert unit.controller("unit").registers(unit.now)[f"{axis} O"] == str(mode)
+    assert profile.winding.name == (f"O{mode}" if mode != 3 else f"1/{64 // judge.space.hand[0]}")

@@ -249,7 +249,15 @@ def _pull_in(found: Made) -> dict[str, Any]:
 
 
 def _print_pull_in(found: Made, facts: dict[str, Any]) -> None:
-    print(f"\nStarts without a ramp into up to {facts['highest_start']:.0f} steps/s; a common rule takes half of it.")
+    from detent.motors.curve import SLOWEST_START
+
+    if not facts["highest_start"]:
+        lowest = SLOWEST_START * found.drive.winding.steps
+        print(f"\nStarts without a ramp into no speed of {lowest:g} steps/s or more: too heavy a load for it, or too "
+              f"much friction; a ramp may do it (resonance at {_resonance(_rig(found)):.3g} steps/s).")  # fmt: skip
+    else:
+        print(f"\nStarts without a ramp into up to {facts['highest_start']:.0f} steps/s; a common rule takes half of "
+              "it.")  # fmt: skip
     if facts["holes"]:
         bands = ", ".join(f"{low:.0f}-{high:.0f}" for low, high in facts["holes"])
         print(f"Resonance loses steps at {bands} steps/s: friction damps it, and so does a finer step.")
@@ -352,7 +360,7 @@ def _default_start(rig: "Rig", slew: int) -> int:
     resonance, per_step = _resonance(rig), rig.drive.winding.steps
     for part in (2.0, 1.5):
         rate = round(part * resonance)
-        if rate < slew and starts(rig, [rate / per_step], steps=20).started[0]:
+        if 1 <= rate < slew and starts(rig, [rate / per_step], steps=20).started[0]:
             return rate
     return max(min(round(resonance / 8), slew), 1)
 
@@ -379,7 +387,7 @@ class _Variants(NamedTuple):
         if self.tried == 0:
             return None, "variants: none asked for"
         tried = VARIANTS if self.tried is None else self.tried
-        seconds = (move.train.duration or 0) * 1e-9
+        seconds = ((move.train.duration or 0) + move.rig.settle) * 1e-9
         work = seconds * (tried + len(corners(self.spread.of(move.rig))))
         most = MOST_SIMULATED if move.rig.load.is_steady else MOST_SIMULATED / 10
         if self.tried is None and (work > most or not engine.fast()):
@@ -396,7 +404,7 @@ def _judge(
 
     duration = move.train.duration
     assert duration is not None
-    _warn_of_waiting(duration * 1e-9)
+    _warn_of_waiting((duration + move.rig.settle) * 1e-9)
     run = simulate(move.train, move.rig, sample=max(duration // 20_000, 1) if plot is not None else None)
     verdict = run.verdict
     loss = diagnose(move.train, move.rig) if verdict.lost else None
@@ -450,8 +458,8 @@ def _warn_of_waiting(seconds: float) -> None:
 
     if seconds > LONGEST:
         raise MotorError(
-            f"a move of {seconds:.0f} s takes too long to compute, and at constant speed nothing new happens: judge a "
-            f"shorter one, of at most {LONGEST:.0f} s"
+            f"a move of {seconds:.0f} s, with its time to settle, takes too long to compute, and at constant speed "
+            f"nothing new happens: judge a shorter one, of at most {LONGEST:.0f} s"
         )
     wait = seconds / SIMULATED
     if wait > 4 and engine.fast() and sys.stderr.isatty():

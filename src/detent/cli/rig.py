@@ -126,9 +126,10 @@ Options = Annotated[RigOptions, Parameter(name="*")]
 
 
 def made(name: str, options: RigOptions, winding: "Winding | None" = None) -> Made:
-    """Motor, drive and load; `winding` is that of a controller, unless the options name one.
+    """Motor, drive and load; `winding` is what a controller makes of the step that the options name, or of none.
 
-    `name` is a motor's, or a TOML file of one's own. MotorError, OSError.
+    Its table for a step may have other currents than the usual one of that name. `name` is a motor's, or a TOML file of
+    one's own. MotorError, OSError.
     """
     from dataclasses import replace
 
@@ -140,7 +141,7 @@ def made(name: str, options: RigOptions, winding: "Winding | None" = None) -> Ma
 
     if options.damping is not None and options.ring_down is not None:
         raise MotorError("--damping and --ring-down: give one of them")
-    table = by_name(options.step) if options.step is not None else winding or HALF
+    table = winding or (HALF if options.step is None else by_name(options.step))
     supply = SUPPLY if options.supply is None else options.supply
     motor, fit, words = _motor(name, options, table, supply)
     drive = _drive(options, supply, motor.current if options.current is None else options.current, table)
@@ -278,6 +279,14 @@ def _ring_down(rig: "Rig", text: str) -> Any:
     if len(numbers) > 2:
         raise MotorError(f"--ring-down {text}: give overshoot and settling time: 0.45,0.03")
     return ring_down.from_overshoot(rig, *numbers)
+
+
+def step_of(rig: RigOptions, model: str) -> str | None:
+    """The stepping asked for. ValueError where that is a setting of the controller."""
+    if rig.step is not None and model.lower().startswith("bs0") and rig.step not in ("O0", "O1", "O2"):
+        raise ValueError(f"--step {rig.step}: the step size of a {model} is an option: --set step_size=4 is 1/16; "
+                         "what --step takes is its step mode: O0, O1, O2")  # fmt: skip
+    return rig.step
 
 
 def read_by(name: str, options: RigOptions) -> list[Path]:

@@ -106,7 +106,7 @@ def tune(
         Print everything as one line of JSON.
     """
     from detent.cli.endings import asked_wrongly, tell
-    from detent.cli.rig import made, read_by, spread_of
+    from detent.cli.rig import made, read_by, spread_of, step_of
     from detent.moves.law import winding_of
     from detent.tuner import tune as tuning
     from detent.tuner.judge import judge_of
@@ -139,7 +139,7 @@ def tune(
         if not divided_up:
             check_installed()  # before a fit, which takes its time
         asked, options = moves_of(moves), _options(set_)
-        found = made(motor, rig, winding_of(_law(model, options, axis), _step(rig, model)))
+        found = made(motor, rig, winding_of(_law(model, options, axis), step_of(rig, model)))
         task = Task(model, check_rig(found.rig, found.motor.name), asked, options, axis, spread_of(vary), seed,
                     not no_corners, final=variants)  # fmt: skip
         if into is not None:
@@ -232,14 +232,6 @@ def _law(model: str, options: dict[str, object], axis: str) -> Any:
     from detent.moves.laws import law
 
     return law(model, options, axis)
-
-
-def _step(rig: RigOptions, model: str) -> str | None:
-    """The stepping asked for. ValueError where that is a setting of the controller."""
-    if rig.step is not None and model.lower().startswith("bs0") and rig.step not in ("O0", "O1", "O2"):
-        raise ValueError(f"--step {rig.step}: the step size of a {model} is an option: --set step_size=4 is 1/16; "
-                         "what --step takes is its step mode: O0, O1, O2")  # fmt: skip
-    return rig.step
 
 
 def _check(

@@ -29,21 +29,22 @@ def tune_batch(
 ) -> None:  # fmt: skip
     """Tune each row, and print the table with what was found as it comes; with `json` a line of JSON each."""
     from detent.cli.endings import asked_wrongly
-    from detent.cli.rig import made, spread_of
+    from detent.cli.rig import made, spread_of, step_of
     from detent.moves.law import winding_of
     from detent.moves.laws import law
     from detent.tuner.task import Task, check_rig, moves_of
 
     try:
         rows = _rows(path)
-        winding = winding_of(law(model, options, axis), rig.step)
+        made_of = law(model, options, axis)
         tasks: list[Task] = []
         for number, row in enumerate(rows, 2):
             try:
                 name, distances = row.get("motor") or motor, row.get("moves") or moves
                 if name is None or distances is None:
                     raise ValueError("there must be a motor and moves, in a column or as --motor and --moves")
-                found = made(name, _options(rig, row), winding)
+                given = _options(rig, row)
+                found = made(name, given, winding_of(made_of, step_of(given, model)))
                 tasks.append(Task(model, check_rig(found.rig, name), moves_of(distances), options, axis,
                                   spread_of(vary), seed, at_corners, final=variants))  # fmt: skip
             except ValueError as error:

@@ -30,6 +30,7 @@ GOLDEN = 0.6180339887498949
 PRECISION = 1e-3  # rad, of the load angle
 LEAST_RATE, MOST_RATE = 0.01, 1e6  # full steps/s: within these a step motor turns
 STANDING = 5.0  # full steps/s: slower the torque is the same, as nothing but the resistance is left
+SLOWEST_START = 20.0  # full steps/s, that is tried
 MOST_WORK = 2e8  # substeps of one curve or one search for start rates
 
 
@@ -258,11 +259,11 @@ def starts(rig: Rig, rates: Sequence[float], *, steps: int = 200) -> Starts:
 def pull_in_rate(
     motor: Motor, drive: Drive, load: Load = NO_LOAD, *, steps: int = 200, damping: Damping | None = None
 ) -> Starts:
-    """The start-stop rates in octaves of a twelfth, from 20 full steps/s to where nothing starts any more."""
+    """The start-stop rates in octaves of a twelfth, from `SLOWEST_START` to where nothing starts any more."""
     rig = Rig(motor, replace(drive), load, damping=damping)
     rates: list[float] = []
     good: list[bool] = []
-    rate, misses = 20.0, 0
+    rate, misses = SLOWEST_START, 0
     while misses < 12 and rate < MOST_RATE:
         found = starts(rig, [rate], steps=steps)
         rates.append(rate)

@@ -11,7 +11,7 @@ import numpy as np
 
 from detent.motors import kernel
 from detent.motors.curve import MOST_RATE, pull_out
-from detent.motors.move import SETTLE, Pulses, chunks_of, parts_of, simulate
+from detent.motors.move import Pulses, chunks_of, parts_of, simulate
 from detent.motors.rotor import Floats, Rig
 from detent.ticks import MS, US, Ns
 
@@ -41,8 +41,9 @@ class Loss(NamedTuple):
         )
 
 
-def diagnose(pulses: Pulses, rig: Rig, *, settle: Ns = SETTLE) -> Loss | None:
+def diagnose(pulses: Pulses, rig: Rig, *, settle: Ns | None = None) -> Loss | None:
     """Where and why the move is lost; None if it is not. MotorError as `simulate`."""
+    settle = rig.settle if settle is None else settle
     run = simulate(pulses, rig, settle=settle)
     if not run.verdict.lost:
         return None

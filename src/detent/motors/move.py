@@ -17,9 +17,8 @@ from detent.motors.excitation import Int64, Sequencer
 from detent.motors.motor import MotorError
 from detent.motors.rotor import Floats, Rig, Rotor, substeps, swing_of
 from detent.pulses import Train
-from detent.ticks import MS, Ns, show_duration
+from detent.ticks import Ns, show_duration
 
-SETTLE: Ns = 40 * MS
 STILL = 0.02  # full steps: a rotor that swings by less is at rest
 CHUNK = 1 << 16
 MOST_SUBSTEPS = 20_000_000_000  # hours, even compiled
@@ -131,17 +130,18 @@ def simulate(
     pulses: Pulses,
     rig: Rig,
     *,
-    settle: Ns = SETTLE,
+    settle: Ns | None = None,
     sample: Ns | None = None,
     begin: Ns = 0,
 ) -> Run:
-    """What the motor makes of these pulses, from rest at `begin`, to `settle` after the last one.
+    """What the motor makes of these pulses, from rest at `begin`, to `settle` (the rig's) after the last one.
 
     `sample` asks for a trace with a row every so often (0: every substep). MotorError for data that do not go
     together, for a train without end, and for a job too long to be waited for.
     """
     parts = parts_of(pulses)
     count, ends = extent_of(parts, begin)
+    settle = rig.settle if settle is None else settle
     work = substeps(ends + settle - begin, count, rig.substep)
     what = f"a move of {count} pulses in {show_duration(ends - begin)}"
     if work > MOST_SUBSTEPS:

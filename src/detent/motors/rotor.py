@@ -14,10 +14,13 @@ from detent.motors.excitation import Changes, Sequencer
 from detent.motors.load import NO_LOAD, Load
 from detent.motors.motor import Motor, MotorError, Shared
 from detent.motors.winding import Winding
-from detent.ticks import US, Ns
+from detent.ticks import MS, SECOND, US, Ns
 
 SUBSTEP: Ns = 20 * US
 FINE: Ns = 10 * US  # for verdicts that are printed
+SETTLE: Ns = 40 * MS
+MOST_SWING = 600.0  # s: nothing that a step motor moves swings more slowly
+SWINGS = 3  # that a heavy rotor, which swings more slowly, gets to settle
 
 Floats = npt.NDArray[np.float64]
 
@@ -58,6 +61,22 @@ class Rig(Shared):
             return self.drive.current
         return self.drive.volts / (self.motor.resistance + self.drive.resistance)
 
+    @property
+    def settle(self) -> Ns:
+        """How long after the last pulse it is looked at: it has come to rest by then, or has left its place for good.
+
+        A rotor that is too fast to be held leaves within a swing; one that swings slowly is still about its place after
+        `SETTLE`, whatever becomes of it.
+        """
+        return max(SETTLE, ceil(SWINGS * self._swing * SECOND))
+
+    @property
+    def _swing(self) -> float:
+        """Seconds of a small swing about a place with one phase on."""
+        motor = self.motor
+        stiffness = motor.teeth * motor.torque_constant * self.drive.current
+        return 2 * pi * sqrt((motor.rotor + self.load.inertia) / stiffness)
+
     def __post_init__(self) -> None:
         motor, drive, load = self.motor, self.drive, self.load
         drive.check(motor)
@@ -71,6 +90,11 @@ class Rig(Shared):
             raise MotorError(
                 f"motor {motor.name}: L / R of {motor.real_inductance / resistance:.2g} s, or the inertia of "
                 f"{inertia:.2g} kg m2, is too small to be a motor's: check the units (H, kg m2)"
+            )
+        if self._swing > MOST_SWING:
+            raise MotorError(
+                f"an inertia of {inertia:.3g} kg m2 is too large for {motor.name}, on which it swings once in "
+                f"{self._swing:.3g} s: check the unit (1 g cm2 is 1e-7 kg m2), or give a gear"
             )
         set_ = object.__setattr__
         if self.damping is None:
@@ -88,6 +112,7 @@ class Rig(Shared):
         par[kernel.GAIN] = resistance
         par[kernel.T_START], par[kernel.T_STEP] = load.torque_by_time[:2]
         par[kernel.P_START], par[kernel.P_STEP] = load.torque_by_position[:2]
+        par[kernel.P_START] += winding.offset / motor.teeth  # the kernel counts from electrical angle 0
         torque = motor.torque_constant * sqrt(2) * drive.current
         par[kernel.DAMPING] = 2 * self.damping.ratio * sqrt(motor.teeth * torque * motor.rotor)
         par[kernel.ROLL_OFF] = self.damping.roll_off * 2 * pi / motor.steps

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from detent.motors import chance, engine, gpu, kernel
 from detent.motors.excitation import NOTHING, Changes, Sequencer, joined
 from detent.motors.motor import MotorError
-from detent.motors.move import SETTLE, Pulses, Verdict, chunks_of, extent_of, judged, parts_of
+from detent.motors.move import Pulses, Verdict, chunks_of, extent_of, judged, parts_of
 from detent.motors.rotor import Floats, Rig, limit_of, substeps, swing_of
 from detent.ticks import Ns
 
@@ -151,11 +151,11 @@ class Ensemble:
         """Variant k alone, to be looked at."""
         return changed(self.rig, **dict(zip(QUANTITIES, map(float, self.factors[k]), strict=True)))
 
-    def judge(self, pulses: Pulses, *, settle: Ns = SETTLE, begin: Ns = 0) -> Outcomes:
-        """What becomes of the move in each variant."""
+    def judge(self, pulses: Pulses, *, settle: Ns | None = None, begin: Ns = 0) -> Outcomes:
+        """What becomes of the move in each variant, `settle` (that of the rig) after its last pulse."""
         return _outcomes(_Move(self.rig, pulses, settle, begin), self.parameters, self._lanes(), self.substep)
 
-    def survives(self, pulses: Pulses, *, settle: Ns = SETTLE, begin: Ns = 0) -> int | None:
+    def survives(self, pulses: Pulses, *, settle: Ns | None = None, begin: Ns = 0) -> int | None:
         """None if no variant loses a step; else the index of one that does, found as early as may be.
 
         The first variants are looked at first: put those in front that lost other moves.
@@ -219,7 +219,7 @@ def percent(part: float) -> str:
 
 
 def loss_rate(
-    pulses: Pulses, rig: Rig, *, spread: Spread = SPREAD, tried: int = 512, seed: int = 1, settle: Ns = SETTLE,
+    pulses: Pulses, rig: Rig, *, spread: Spread = SPREAD, tried: int = 512, seed: int = 1, settle: Ns | None = None,
     first: int = UNMET, looks: int = 1,
 ) -> LossRate:  # fmt: skip
     """How often the move is lost by variants of the rig: `tried` draws from `first` on, and all corners."""
@@ -266,7 +266,7 @@ def changed(rig: Rig, **factors: float) -> Rig:
     return made
 
 
-def judge(pulses: Pulses, rigs: Sequence[Rig], *, settle: Ns = SETTLE, begin: Ns = 0) -> list[Verdict]:
+def judge(pulses: Pulses, rigs: Sequence[Rig], *, settle: Ns | None = None, begin: Ns = 0) -> list[Verdict]:
     """A verdict for each rig, all given the same pulses.
 
     The rigs have the same stepping, decay and profile of the load, and step as finely as the finest of them needs.
@@ -283,6 +283,7 @@ def judge(pulses: Pulses, rigs: Sequence[Rig], *, settle: Ns = SETTLE, begin: Ns
             )
     par = np.array([rig.parameters for rig in rigs]).T
     substep = min(rig.substep for rig in rigs)
+    settle = max(rig.settle for rig in rigs) if settle is None else settle
     found = _outcomes(_Move(first, pulses, settle, begin), par, np.ones(len(rigs)), substep)
     return [found.verdict(k) for k in range(len(rigs))]
 
@@ -301,11 +302,11 @@ def _shared(rig: Rig) -> tuple[Any, ...]:
 class _Move:
     """The changes of a pulse train for the drive of a rig; made once where it is short enough to be kept."""
 
-    def __init__(self, rig: Rig, pulses: Pulses, settle: Ns, begin: Ns) -> None:
+    def __init__(self, rig: Rig, pulses: Pulses, settle: Ns | None, begin: Ns) -> None:
         self.rig, self.begin = rig, begin
         self.parts = parts_of(pulses)
         self.count, ends = extent_of(self.parts, begin)
-        self.until = ends + settle
+        self.until = ends + (rig.settle if settle is None else settle)
         self.start = Sequencer(rig.drive)
         self._kept = list(self._made()) if self.count <= KEPT_PULSES else None
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+MARGIN = 0.03  # left and right of a heading, as a part of the width
 COMMAND, ROTOR, PHASE_A, PHASE_B, LOST = GREY, COLOURS[0], COLOURS[2], COLOURS[1], "#C0392B"
 
 
@@ -98,9 +99,19 @@ def _figure(width: float, height: float) -> "Figure":
 
 
 def _head(figure: "Figure", title: str, about: str) -> None:
+    """A title, and a line about it: two where it is long. What is longer still is written smaller."""
     height = figure.get_figheight()
-    figure.text(0.03, 1 - 0.36 / height, title, fontsize=14, fontweight="bold")
-    figure.text(0.03, 1 - 0.62 / height, about, fontsize=10, color=GREY)
+    room = (1 - 2 * MARGIN) * figure.bbox.width
+    titled = figure.text(MARGIN, 1 - 0.36 / height, title, fontsize=14, fontweight="bold")
+    lines = figure.text(MARGIN, 1 - 0.52 / height, about, fontsize=10, color=GREY, verticalalignment="top")
+    if lines.get_window_extent().width > room:
+        blanks = [k for k, letter in enumerate(about) if letter == " "]
+        if blanks:
+            middle = min(blanks, key=lambda k: abs(k - len(about) // 2))
+            lines.set_text(f"{about[:middle]}\n{about[middle + 1 :]}")
+    for text in (titled, lines):
+        while (width := text.get_window_extent().width) > room:  # letters stand on whole pixels
+            text.set_fontsize(float(text.get_fontsize()) * min(room / width, 0.98))
 
 
 def label_axes(axes: "Axes", x: str, y: str) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from detent.motors.rotor import Floats
 from detent.motors.variants import UNMET, Ensemble
@@ -14,7 +15,8 @@ from detent.tuner.quasi_static import Torque, torque_of
 from detent.tuner.search import Check
 from detent.tuner.task import Task, check_installed
 
-SMOOTHED = 8  # pulses either way that a speed is the mean of
+SMOOTHED = 8  # pulses that a speed is the mean of ...
+TICKS = 600  # ... and ticks of the controller at least: a pulse comes up to one of them late
 MOST_POINTS = 4000
 
 
@@ -70,6 +72,7 @@ def torque_used(train: Train, torque: Torque) -> tuple[Floats, Floats, Floats]:
         return times, np.zeros_like(times), np.zeros_like(times)
     each = max(SMOOTHED, len(times) // MOST_POINTS)
     marks = np.unique(np.concatenate((np.arange(0, len(times), min(each, max(len(times) // 8, 1))), [len(times) - 1])))
+    marks = _apart(marks, times, min(TICKS * _tick(train), (times[-1] - times[0]) / 8))
     gaps = np.diff(times[marks])
     speeds = np.diff(marks) / gaps
     at = (times[marks][1:] + times[marks][:-1]) / 2
@@ -77,3 +80,17 @@ def torque_used(train: Train, torque: Torque) -> tuple[Floats, Floats, Floats]:
     needed = acceleration * torque.inertia * torque.radians + np.interp(speeds, torque.speeds, torque.steady)
     available = np.maximum(np.interp(speeds, torque.speeds, torque.available), 1e-9)
     return at, speeds, needed / available
+
+
+def _tick(train: Train) -> float:
+    """Seconds of which the time from pulse to pulse is always a multiple."""
+    return float(np.gcd.reduce(np.diff(np.asarray(train.times(), np.int64)))) * 1e-9
+
+
+def _apart(marks: npt.NDArray[np.int64], times: Floats, least: float) -> npt.NDArray[np.int64]:
+    """Those of the marks that are so many seconds apart; the last one stays."""
+    kept = [int(marks[0])]
+    for mark in marks[1:-1].tolist():
+        if times[mark] - times[kept[-1]] >= least <= times[marks[-1]] - times[mark]:
+            kept.append(mark)
+    return np.array([*kept, int(marks[-1])], np.int64)

@@ -163,7 +163,7 @@ class _Search:
         self.examples = [NOMINAL, *task.corners, *task.drawn(0, AT_FIRST)]
         self.drawn = AT_FIRST
         self.looks = self.settled = self.tested = self.total = self.widened = 0
-        self.best: tuple[float, Point, int] | None = None  # time, point, variants that it has met
+        self.known: list[tuple[float, Point]] = []  # what has survived all that it was asked, the fastest first
         self.last_lost: tuple[Point, int] | None = None
         self.agenda = _Agenda(self.judge, list(self.judge.space.dimensions))
 
@@ -173,11 +173,12 @@ class _Search:
             self.probe()
             return self.go()
         except _Cancelled:
-            if self.best is None:
-                raise Stopped("stopped before any setting without loss was known") from None
-            _, point, met = self.best
-            corners = len(self.task.corners)
-            return self.found(point, Check(0, 0, corners, 0, max(self.looks, 1), met), whole=False)
+            examples = tuple(self.examples)
+            for _, point in self.known:  # others have lost something since it was asked
+                if not any(self.run(self.task, [Job(point, examples)])):
+                    check = Check(0, 0, len(self.task.corners), 0, max(self.looks, 1), len(examples))
+                    return self.found(point, check, whole=False)
+            raise Stopped("stopped before any setting without loss was known") from None
 
     def go(self) -> Found:
         expanded: set[Point] = set()
@@ -197,8 +198,6 @@ class _Search:
                 check = Check(self.task.final, 0, len(self.task.corners), 0, self.looks, len(self.examples))
                 return self.found(point, check, whole=True)
             self.learn(point, lost)
-            if self.best is not None and self.best[1] == point:
-                self.best = None
         raise TunerError(self.why_none())
 
     def survivor(self) -> tuple[float, Point] | None:
@@ -214,8 +213,7 @@ class _Search:
             found = None
             for (time, point), lost in zip(batch, answers, strict=True):
                 if lost:
-                    self.settled += 1
-                    self.last_lost = point, lost[0]
+                    self.settle(point, lost[0])
                     if found is None:  # what loses often is asked first: it saves time, and changes nothing
                         self.examples.remove(lost[0])
                         self.examples.insert(0, lost[0])
@@ -270,7 +268,7 @@ class _Search:
         for _ in range(PROBES):
             if low >= high:
                 break
-            middle = (low + high) // 2 if self.best is not None else (low + 3 * high) // 4
+            middle = (low + high) // 2 if self.known else (low + 3 * high) // 4
             point = order[middle][2]
             time = self.judge.time(point)
             if time is not None and not self.answers([Job(point, tuple(self.examples))])[0]:
@@ -294,13 +292,17 @@ class _Search:
 
     def learn(self, point: Point, losers: Lost) -> None:
         """The point is lost; what lost it joins the counter-examples."""
-        self.settled += 1
-        self.last_lost = point, losers[0]
+        self.settle(point, losers[0])
         self.examples += [loser for loser in losers if loser not in set(self.examples)][:ADDED]
 
+    def settle(self, point: Point, loser: int) -> None:
+        """The point is lost."""
+        self.settled += 1
+        self.last_lost = point, loser
+        self.known = [entry for entry in self.known if entry[1] != point]
+
     def note(self, time: float, point: Point) -> None:
-        if self.best is None or time < self.best[0]:
-            self.best = time, point, len(self.examples)
+        self.known = sorted({*self.known, (time, point)})
 
     def fresh(self, count: int) -> tuple[int, ...]:
         """Draws that nobody has met."""
@@ -310,7 +312,7 @@ class _Search:
     def tell(self, at: float | None) -> None:
         self.total = max(self.total, self.settled)
         doing = "looking about" if at is None else f"at {at:.4g} s"
-        self.watch(Progress(self.settled, self.total, self.best[0] if self.best is not None else None, doing))
+        self.watch(Progress(self.settled, self.total, self.known[0][0] if self.known else None, doing))
 
     def found(self, point: Point, check: Check, *, whole: bool) -> Found:
         trains, times = self.judge.trains(point), self.judge.times(point)

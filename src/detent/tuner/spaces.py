@@ -25,8 +25,8 @@ class Profile(NamedTuple):
     """Settings of a controller, with the law that makes pulses of them.
 
     `part` of the steps of this law are one step of those in which the moves are given (a coarser microstep makes one
-    step of several). `before` are lines to send first, `options` what the model must be set up with, as cell files
-    write it.
+    step of several). `before` are lines to send first, `again` those that set what they reset and no setting is,
+    `options` what the model must be set up with, as cell files write it.
     """
 
     law: Law
@@ -35,6 +35,7 @@ class Profile(NamedTuple):
     part: tuple[int, int] = (1, 1)
     before: tuple[str, ...] = ()
     options: Mapping[str, str] = {}
+    again: tuple[str, ...] = ()
 
     def steps(self, distance: int) -> int:
         """The distance in steps of this law."""
@@ -49,7 +50,7 @@ class Profile(NamedTuple):
         """The lines that set it up."""
         lines = self.law.commands(self.values, 1).settings
         choice = tuple(line for line in lines if line in ("X", "Y"))
-        return (*self.before, *choice, *(line for line in lines if line not in choice))
+        return (*self.before, *choice, *self.again, *(line for line in lines if line not in choice))
 
     def go(self, distance: int) -> str:
         """The line that makes a move."""
@@ -243,8 +244,10 @@ def _genstepper(task: Task, torque: Torque, hand: RuleOfThumb) -> Space:
             return None
         found = laws[size]
         before = () if sizes == [given] and "step_size" not in task.options else (f"{size}{Op.RESET.value}",)
+        # a reset leaves the step mode that is usual, O3; the others follow it in the order of their numbers
+        again = (f"{mode - 1}{Op.MODE.value}",) if before and mode else ()
         return Profile(found, dict(zip("KRP", values, strict=True)), found.windings[mode], (given, size), before,
-                       {"step_size": str(size)})  # fmt: skip
+                       {"step_size": str(size)}, again)  # fmt: skip
 
     size = given if given in sizes else sizes[0]
     limit = most * size // 64
