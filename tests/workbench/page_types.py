@@ -36,7 +36,7 @@ class Offered(Live):
         super().__init__()
         self.calls: dict[str, Callable[..., Any]] = {}
 
-    def offer(self, name: str, call: Callable[..., Any], *, fresh: bool = False) -> None:
+    def offer(self, name: str, call: Callable[..., Any], *, moves: str = "", stops: bool = False) -> None:
         self.calls[name] = call
 
 

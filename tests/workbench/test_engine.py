@@ -21,9 +21,9 @@ from detent.realtime.endpoints.spec import EndpointSpec
 from detent.ticks import MS, SECOND
 from detent.workbench.board import table
 from detent.workbench.client import Bench, BenchError
-from detent.workbench.engine import BASE, BATCH, LEAST_KEPT, keep
 from detent.workbench.line_scripts import LineScripts
 from detent.workbench.live import Live
+from detent.workbench.memory import BASE, BATCH, LEAST_KEPT, keep
 from detent.workbench.messages import State
 from detent.workbench.scope import Trigger
 

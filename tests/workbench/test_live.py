@@ -239,7 +239,7 @@ def test_what_moves_is_not_done_late_and_a_stop_is(live: Live) -> None:
     async def stop() -> None:
         done.append("stop")
 
-    live.offer("move", move, fresh=True)
+    live.offer("move", move, moves="units")
     live.offer("stop", stop)
 
     async def run() -> None:

@@ -12,7 +12,7 @@ from detent.cell.actions import Action, Type
 from detent.cell.description import parse
 from detent.outputs.units import views
 from detent.ticks import MS, SECOND, Ns
-from detent.workbench.engine import BATCH
+from detent.workbench.memory import BATCH
 from detent.workbench.messages import Happened, Opened
 from detent.workbench.mirror import Mirror
 

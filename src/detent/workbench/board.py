@@ -19,6 +19,7 @@ from detent.pins import Level
 from detent.ticks import MS, Ns
 from detent.workbench.live import Live, Value
 from detent.workbench.messages import Mark, State, UnitState
+from detent.workbench.stops import BOARDS
 from detent.workbench.words import check_typed
 
 if TYPE_CHECKING:
@@ -217,6 +218,7 @@ def _offer(bench: "Bench", live: Live) -> None:
         await bench.restart()
 
     async def stop_motors() -> None:
+        live.stops.stop(BOARDS)
         await bench.stop_motors()
 
     async def recover() -> None:
@@ -231,8 +233,19 @@ def _offer(bench: "Bench", live: Live) -> None:
             await bench.kill()
             await bench.revive()
 
-    moving = (power, set_pin, set_switch, send, type, start, recover)  # a machine, where the cell drives one
+    moving = (
+        power,
+        set_pin,
+        set_strap,
+        set_switch,
+        send,
+        type,
+        start,
+        recover,
+        revive,
+    )  # a machine, where it drives one
     for action in (pace, faster, slower, step_instruction, step_back, rewind, power, set_switch, set_pin, set_strap,
                  place_switch, send, type, withdraw, start, break_on_errors, hold, go, step_event, breaks, mend,
                  take_branch, compare_branch, restart, stop_motors, recover, revive, end_silent):  # fmt: skip
-        live.offer(action.__name__, action, fresh=action in moving)
+        name, moves = action.__name__, BOARDS if action in moving else ""
+        live.offer(name, action, moves=moves, stops=action is stop_motors)

@@ -21,13 +21,13 @@ from detent.pins import Level
 from detent.realtime.cell_source import find_cell
 from detent.realtime.endpoints.spec import EndpointSpec
 from detent.realtime.endpoints.tcp import TcpAddress
-from detent.ticks import SECOND, Ns
-from detent.workbench import exports, joining
+from detent.ticks import Ns
+from detent.workbench import exports, joining, saving
 from detent.workbench.messages import (
+    MOVES,
     Answer,
     Ask,
     Failed,
-    Fault,
     Happened,
     Mark,
     Marked,
@@ -42,7 +42,6 @@ from detent.workbench.programs import Program
 from detent.workbench.scope import Scope, ScopeData, Trace, Trigger
 from detent.workbench.talk import Talk, Talks
 
-PATIENCE: Ns = 2 * SECOND  # of the cell, for an answer to the command that keeps a program
 LEAVING = 5.0  # seconds that an engine has to end
 STOP_SECONDS = 2.0  # that it has to confirm an emergency stop
 UNDRIVEN = (
@@ -77,6 +76,8 @@ class Bench:
     """Where programs look at the cell and meddle with it; None if nowhere."""
     cut: int
     """How often the past was changed: what was drawn from `scope` or `terminal` before is no longer true."""
+    check_moves: Callable[[], None]
+    """Called before whatever may move a machine is asked of the engine. It raises where that is not to be done."""
 
     @classmethod
     async def open(
@@ -115,6 +116,7 @@ class Bench:
         """Use `open`."""
         self.crashed = None
         self.cut = 0
+        self.check_moves = lambda: None
         self._order = order
         self._heard = time.monotonic()
         self._process: Process | None = None
@@ -134,6 +136,12 @@ class Bench:
     async def _start(self, order: Order) -> None:
         """Start an engine and wait until it serves."""
         self._process, ours = await joining.started()
+        try:
+            if order.real:
+                self.check_moves()  # it moves what it drives as soon as it lives: a program that is kept may begin
+        except BaseException:
+            ours.close()  # it ends
+            raise
         reader, self._writer = await asyncio.open_connection(sock=ours)
         self._ready = asyncio.get_running_loop().create_future()
         self._writer.write(packed(order))
@@ -247,6 +255,8 @@ class Bench:
         """Have a verb of the engine done. Raises BenchError."""
         if self._writer is None or self._reader is None or self._reader.done():
             raise BenchError(self.crashed or "the workbench is closed")
+        if verb in MOVES and self._order.real:
+            self.check_moves()
         if not self._asked:
             self._heard = time.monotonic()
         self._number += 1
@@ -434,31 +444,12 @@ class Bench:
         While the cell is held the command waits on the line; the text then says so. Raises BenchError if the unit
         refuses it, or does not answer within two seconds of the cell's time.
         """
-        before = self._error_of(unit)
-        written: int = await self._ask("save", unit)
-        sent = self.state.now
-
-        def over(state: State) -> bool:
-            now = state.units[unit]
-            return now.stored > written or now.error != before or state.held or state.now > sent + PATIENCE
-
-        await self.alarm(f"save {unit}", sent + PATIENCE + 1)
-        state = await self.until(over)
-        await self.alarm(f"save {unit}", None)
-        now = state.units[unit]
-        if now.stored > written:
-            return f"{unit} has kept its program"
-        if now.error is not None and now.error != before:
-            raise BenchError(f"{unit} refused it: {now.error.reason}")
-        if state.held:
-            return f"the command is on its way to {unit}: it keeps its program when the cell goes on"
-        raise BenchError(f"{unit} does not answer: see whether it is switched on, and not busy")
-
-    def _error_of(self, unit: str) -> Fault | None:
-        try:
-            return self.state.units[unit].error
-        except KeyError:
-            raise BenchError(f"no unit {unit!r} in this cell") from None
+        if unit not in self.state.units:
+            raise BenchError(f"no unit {unit!r} in this cell")
+        kept, words = await saving.saved(self, unit, lambda: self._ask("save", unit))
+        if not kept:
+            raise BenchError(words)
+        return words
 
     async def read_back(self, unit: str, *, kept: bool = False) -> bytes:
         """The program memory from address 0 on; with `kept`, what is kept without supply. b"" where there is none."""

@@ -14,6 +14,7 @@ from detent.workbench.beside import beside
 from detent.workbench.drafts import LONGEST
 from detent.workbench.live import Live
 from detent.workbench.programs import Checked, Program
+from detent.workbench.stops import BOARDS
 from detent.workbench.words import words
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class Editing:
         self._bench, self._live = bench, live
         self._memory: dict[str, tuple[int, bytes]] = {}  # by unit: the count of changes, and what was read then
         for name in CALLS:
-            live.offer(f"program_{name}", getattr(self, name), fresh=name == "load")
+            live.offer(f"program_{name}", getattr(self, name), moves=BOARDS if name in ("load", "save") else "")
         bench.on_change(self._show_breakpoints)
         self._show_breakpoints()
 

@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
-from typing import Any, ClassVar, Final, TypeVar
+from typing import ClassVar, TypeVar
 
 from detent.assembler import ImageError
 from detent.cell.actions import (
@@ -47,18 +47,20 @@ from detent.realtime.pace import Lateness as Counted
 from detent.realtime.pace import Pace, WallNs
 from detent.realtime.service import build_with_images, models, open_endpoints
 from detent.realtime.verbs import VERBS
-from detent.realtime.waiting import Condition, Watched
+from detent.realtime.waiting import Watched
 from detent.realtime.watch import Watch
-from detent.ticks import NEVER, SECOND, Ns
+from detent.ticks import Ns
 from detent.uart import Chars
 from detent.workbench import look, rotors
+from detent.workbench.alarms import Alarms
+from detent.workbench.haste import Haste
 from detent.workbench.marks import Marks
+from detent.workbench.memory import keep
 from detent.workbench.messages import (
     Answer,
     Ask,
     Failed,
     Happened,
-    Lateness,
     Marked,
     Opened,
     Order,
@@ -66,22 +68,13 @@ from detent.workbench.messages import (
     RealState,
     State,
 )
-from detent.workbench.mirror import SLACK
 from detent.workbench.pipe import Pipe
 from detent.workbench.waiting import Waiting, Waits
 
-BASE: Final = 210  # MB of both processes before anything has happened
-BATCH: Final = 520  # bytes that a batch of the recording takes at most: of a host that polls, who says the most
-LEAST_KEPT: Final = 20_000  # batches, however little memory there may be
 BY_HAND = "by hand"
 BY_PROGRAM = "by a program"  # that controls it
 T = TypeVar("T")
 WRONG = (Problem, Broken, ImageError, ValueError, KeyError, TypeError)  # of whoever asks
-
-
-def keep(memory: int) -> int:
-    """How many batches of the past can be gone back over in so many MB of engine and pages together."""
-    return max(int((memory - BASE) * 1e6 / (BATCH * (1 + 1 / SLACK))), LEAST_KEPT)
 
 
 class Engine:
@@ -90,13 +83,9 @@ class Engine:
     def __init__(self, end: socket.socket, order: Order) -> None:
         """Build the cell and open its endpoints. Raises Problem, ImagesUnusable, EndpointError, ValueError."""
         self._order = order
-        self._wall: WallNs = 0  # of the last look
-        self._before: Ns = 0  # the cell's time then
-        self._faster = 0.0
-        self._lateness = Lateness(0, 0, 0)
+        self._haste = Haste()
         self._quiet = False  # nothing has changed since it was last told
         self.waiting = Waiting(order.queue)
-        self._alarms: dict[str, Future[dict[str, Any]]] = {}
         self.control: str | None = None  # the URL of who looks and meddles
         self._cleanup = contextlib.ExitStack()
         with contextlib.ExitStack() as opening:
@@ -122,6 +111,7 @@ class Engine:
             endpoints: list[tuple[int, Endpoint]] = [(0, self._pipe), *self._opened]  # what is asked comes first
             patience = [line.format.duration(BEHIND) for line in cell.lines]
             self.watched = Watched(self, self._pace, self._is_present)
+            self._alarms = Alarms(self.watched, lambda: self.now)
             self._loop = Loop(self.watched, self._pace, endpoints, patience=patience, companion=self._companion())
             opening.callback(self._loop.close)
             self._again()
@@ -277,12 +267,7 @@ class Engine:
         self._pipe.push(Answer(message.number, value, error))
 
     def _tick(self, wall: WallNs) -> None:
-        now, passed = self.now, wall - self._wall
-        if passed >= SECOND:
-            self._faster = max(now - self._before, 0) / passed if self._wall else 0.0
-            self._wall, self._before = wall, now
-            late = self._pace.lateness.summary()
-            self._lateness = Lateness(late.p50, late.p99, late.most)
+        self._haste.look(wall, self.now, self._pace)
         if not self._pipe.full and not (self._quiet and self._pace.held):
             self._tell()
 
@@ -317,7 +302,7 @@ class Engine:
             pace=None if pace.free else float(pace.factor),
             held=pace.held,
             stopped_why=history.stopped,
-            lateness=self._lateness,
+            lateness=self._haste.lateness,
             units=look.units(history),
             switches=look.switches(history),
             motors=look.motors(history),
@@ -329,7 +314,7 @@ class Engine:
             formats={name: str(line.format) for name, line in lines.items()},
             speaking={name: line.host_busy_until for name, line in lines.items()},
             dropped=sum(endpoint.dropped for _, endpoint in self._opened),
-            faster=self._faster,
+            faster=self._haste.faster,
             real=self._real_state(),
             queue=self.waiting.queue,
             idle=pace.free and not pace.held and history.cell.next_event() is None,
@@ -372,12 +357,7 @@ class Engine:
 
     def alarm(self, who: str, at: Ns | None) -> None:
         """Let time come to `at` for `who`, at max as well, where nothing else may be due; None: no longer."""
-        before = self._alarms.pop(who, None)
-        if before is not None:
-            before.cancel()
-        if at is not None:
-            due = Condition(lambda: self.now >= at, lambda: at if self.now < at else NEVER)
-            self._alarms[who] = self.watched.wait([due], dict)
+        self._alarms.set(who, at)
 
     def take_branch(self, number: int) -> None:
         """A future that was left happens again; the one that is left for it is kept."""

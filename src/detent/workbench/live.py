@@ -6,6 +6,8 @@ whatever happens: so a window knows a server that hangs from a cell that stands.
 ``{"call": NAME, "args": [...], "id": N}`` and gets ``{"id": N, "value": ...}`` or ``{"id": N, "error": TEXT}``.
 What the server says carries a ``beat``, its own clock in ms, and what a window calls the one that it ``heard`` last:
 so what moves something is not done long after it was asked for, when whoever asked has been told that it was not.
+It carries ``stops`` as well, what the window knew of stops when a hand acted: ``stop.count`` of the table, and how many
+it had called itself on this socket. So nothing that moves is done behind a stop that came after it (`stops`).
 A window that takes no answers is heard no further than `MOST_CALLS` calls.
 """
 
@@ -20,6 +22,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from detent.hosts.errors import told
 from detent.one_line import one_line
+from detent.workbench.stops import Asked, Stops, asked_by
 
 Value: TypeAlias = "str | int | float | bool | Sequence[Value] | Mapping[str, Value] | None"
 Call: TypeAlias = Callable[..., Awaitable[object]]
@@ -39,7 +42,10 @@ class Live:
         self._table: dict[str, Value] = {}
         self._windows: set[_Window] = set()
         self._calls: dict[str, Call] = {}
-        self._fresh: set[str] = set()  # what is not done late
+        self._moves: dict[str, str] = {}  # what is not done late, nor behind a stop of these
+        self._stopping: set[str] = set()  # what stops something
+        self.stops = Stops(lambda count: self.put({"stop.count": count}))
+        self._table["stop.count"] = self.stops.count
         self._answers: set[asyncio.Task[None]] = set()
 
     @property
@@ -60,16 +66,19 @@ class Live:
             for window in self._windows:
                 window.show(changed)
 
-    def offer(self, name: str, call: Call, *, fresh: bool = False) -> None:
+    def offer(self, name: str, call: Call, *, moves: str = "", stops: bool = False) -> None:
         """Let windows call `call` by `name`. Its arguments are checked against its annotations.
 
-        A `fresh` one is not done when it comes `LATE`: it moves something. A stop is done however late it is.
+        `moves`: what it moves, as `stops` names it; it is not done when it comes `LATE`, nor behind a stop of that.
+        One that `stops` is done however late it is.
         """
         if name in self._calls:
             raise ValueError(f"there is a call {name!r} already")
         self._calls[name] = validate_call(call)
-        if fresh:
-            self._fresh.add(name)
+        if moves:
+            self._moves[name] = moves
+        if stops:
+            self._stopping.add(name)
 
     async def serve(self, socket: WebSocket) -> None:
         """One window, from its socket's opening to its end.
@@ -77,7 +86,7 @@ class Live:
         What it has asked for is done though it leaves at once: who closes a window behind a STOP has stopped.
         """
         await socket.accept()
-        window = _Window(socket)
+        window = _Window(socket, self.stops)
         window.show(self._table)
         self._windows.add(window)
         self.put({"windows": self.windows})
@@ -115,9 +124,11 @@ class Live:
             call = self._calls.get(name)
             if call is None:
                 raise ValueError(f"there is no call {name!r}")
-            if name in self._fresh:
-                _check_fresh(asked.get("heard"))
-            answer: dict[str, object] = {"id": number, "value": await call(*arguments)}
+            with asked_by(window.asked(asked.get("stops"), stops_too=name in self._stopping)):
+                if name in self._moves:
+                    _check_fresh(asked.get("heard"))
+                    self.stops.check(self._moves[name])
+                answer: dict[str, object] = {"id": number, "value": await call(*arguments)}
         except Exception as error:  # whatever it is: somebody waits for the answer
             answer = {"id": number, "error": _in_words(name, error)}
             if not isinstance(error, MISTAKES):
@@ -151,8 +162,9 @@ def _in_words(name: str, error: Exception) -> str:
 class _Window:
     """What is to be sent to one window."""
 
-    def __init__(self, socket: WebSocket) -> None:
-        self._socket = socket
+    def __init__(self, socket: WebSocket, stops: Stops) -> None:
+        self._socket, self._stops = socket, stops
+        self._own: list[int] = []  # the numbers of the stops that it has called
         self._values: dict[str, Value] = {}
         self._replies: list[tuple[dict[str, object], asyncio.Event]] = []
         self._work = asyncio.Event()
@@ -162,6 +174,23 @@ class _Window:
         """Send these values soon; values of the same keys that still wait are left out."""
         self._values.update(values)
         self._work.set()
+
+    def asked(self, stops: object, *, stops_too: bool = False) -> Asked:
+        """Who asks, by what its call says of stops: it knows those it was told of, and its own before that call."""
+        match stops:
+            case [int(told), int(own)]:
+                known = max([told, *self._own[: max(own, 0)]])
+            case _:
+                known = self._stops.count
+        if not stops_too:
+            return Asked(known)
+        mine = len(self._own)
+        self._own.append(self._stops.count)
+
+        def stopped(number: int) -> None:
+            self._own[mine] = number
+
+        return Asked(known, stopped)
 
     async def reply(self, answer: dict[str, object]) -> None:
         """Send the answer to a call; until it has gone, or the window has."""

@@ -5,7 +5,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from detent.cell.actions import TimedAction
 from detent.cell.moments import Cut
@@ -275,6 +275,13 @@ class Order(NamedTuple):
     queue: tuple[Waits, ...] = ()  # what waited to be sent
     control: TcpAddress | None = None  # where programs look and meddle; port 0: any that is free
     token: str | None = None  # that they have to know
+
+
+MOVES: Final = frozenset((
+    "power", "set_switch", "set_pin", "send_line", "type", "queue_send", "queue_type", "load", "start", "save",
+    "recover",
+))  # fmt: skip
+"""The verbs of the engine that may move a machine."""
 
 
 class Ask(NamedTuple):

@@ -5,6 +5,7 @@ import contextlib
 import hashlib
 import socket
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +31,7 @@ from detent.workbench.listening import Listening, Place
 from detent.workbench.live import Live
 from detent.workbench.pages import Page, Window, begin, cell, motion, program, scope, terminal, unit
 from detent.workbench.stopping import Stopping
+from detent.workbench.stops import BOARDS
 from detent.workbench.units.registry import Units
 
 if TYPE_CHECKING:
@@ -57,7 +59,8 @@ def application(bench: "Bench", folder: Folder, drafts: Drafts, place: Place, st
             await bench.stop_motors()
             return "every board has stopped, and its axes stand until somebody says Recover"
 
-        stopping.add("boards", stop_boards)
+        stopping.add(BOARDS, stop_boards)
+        bench.check_moves = partial(live.stops.check, BOARDS)
     units = Units(live, stopping, folder, state)
     units.follow(bench)
     site = FastAPI(title="Detent", docs_url=None, redoc_url=None, openapi_url=None)

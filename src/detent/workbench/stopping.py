@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import TypeAlias
 
 from detent.workbench.live import Live
+from detent.workbench.stops import UNITS
 
 Stop: TypeAlias = Callable[[], Awaitable[str]]
 """Stops something, and tells in words what came of it. Raises where that is not known to have worked."""
@@ -25,7 +26,7 @@ class Stopping:
         self._live = live
         self._stops: dict[str, Stop] = {}
         self._tell()
-        live.offer("stop_all", self.stop_all)
+        live.offer("stop_all", self.stop_all, stops=True)
 
     def add(self, name: str, stop: Stop) -> None:
         """`stop` belongs to STOP from now on."""
@@ -40,6 +41,7 @@ class Stopping:
     async def stop_all(self) -> list[str]:
         """Stop all of them at once; what came of each. Raises StopFailed with what may still move."""
         names = list(self._stops)
+        self._live.stops.stop(UNITS, *names)
         told = await asyncio.gather(*(stop() for stop in list(self._stops.values())), return_exceptions=True)
         failed = [f"{name}: {one}" for name, one in zip(names, told, strict=True) if isinstance(one, BaseException)]
         if failed:

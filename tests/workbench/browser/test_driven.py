@@ -63,6 +63,16 @@ def test_stop_stands_on_every_page_and_recover_goes_on(windows: Windows, driven:
     window.until("() => detent.get('marks').some(([at, kind, unit, text]) => text.includes('goes on at'))")
 
 
+def test_the_debugger_offers_what_a_machine_can_do(windows: Windows, driven: Served) -> None:
+    window = opened(windows, driven).open("/program")
+    window.page.locator(".program[data-checked]").wait_for()
+    keys = window.page.get_by_label("Program", exact=True)
+    assert keys.get_by_role("button", name="Back", exact=True).is_visible(), "one may look back"
+    for refused in ("Step", "To cursor", "Break", "On errors"):
+        assert not keys.get_by_text(refused, exact=True).is_visible(), refused
+    window.picture("driven-program")
+
+
 def test_one_looks_back_and_the_machine_goes_on(windows: Windows, driven: Served) -> None:
     window = opened(windows, driven)
     window.until("() => detent.get('end') > 5e8")

@@ -49,6 +49,21 @@ def test_an_axis_is_jogged_sent_and_set_to_zero_in_the_commands_of_its_unit(alon
     alone.picture("manual")
 
 
+def test_a_stop_overtakes_a_jog_that_waits_for_its_first_connection(alone: Window) -> None:
+    if alone.get("r.gs-c200 (cell)"):
+        alone.call("unit_leave", "gs-c200 (cell)")
+    place = alone.get("u.gs-c200.x..position")
+    alone.page.get_by_label("Distance or position of gs-c200").fill("120")
+    alone.page.evaluate("""() => {
+        document.querySelector('.manual [data-jog="1"]').click();
+        document.querySelector('.manual [data-role=stop]').click();
+    }""")
+    alone.page.get_by_text("STOP came behind it").wait_for()
+    alone.page.locator(".manual .sent").get_by_text("stop").wait_for()
+    alone.picture("overtaken")
+    assert alone.get("u.gs-c200.x..position") == place
+
+
 def test_an_axis_runs_as_long_as_a_key_is_held_and_stops_when_it_is_let_go(alone: Window) -> None:
     key = alone.page.get_by_role("button", name="Hold plus of gs-c200")
     alone.page.get_by_label("Distance or position of gs-c200").fill("1")

@@ -50,6 +50,8 @@ interface Detent {
   keys(): Iterable<string>;
   /** Make a call to the process of the pages. Throws what it says is wrong. */
   call<Name extends keyof Calls>(name: Name, ...args: Parameters<Calls[Name]>): Promise<ReturnType<Calls[Name]>>;
+  /** The same for several calls that one hand began: what moves is refused behind a stop that came after that. */
+  asking(): <Name extends keyof Calls>(name: Name, ...args: Parameters<Calls[Name]>) => Promise<ReturnType<Calls[Name]>>;
   /** The same by hand: what is wrong is shown, and nothing is thrown. */
   action<Name extends keyof Calls>(name: Name, ...args: Parameters<Calls[Name]>): Promise<ReturnType<Calls[Name]> | null>;
   meant(key: string, now?: any): any;

@@ -53,8 +53,14 @@ class Faults:
         ledger.barred = self._cell.now
 
     def stop(self) -> None:
-        """Emergency stop: every board stops at once, and every axis stands until `recover`."""
+        """Emergency stop: every board stops at once, and every axis stands until `recover`.
+
+        What waits to be sent to units is dropped: it was said before, and would be heard when they go on.
+        """
         self._boards.emergency_stop(self._outgoing.wall())
+        for number, line in enumerate(self._cell.lines):
+            if not line.hosted:
+                self._cell.discard(number)
         for ledger in self._ledgers:
             if ledger.standing is Standing.DRIVEN:
                 self.fault(ledger, BY_HAND, known=False)

@@ -1,6 +1,6 @@
 // A key that is held: the axis runs as long as it is, and stops when it is let go, or its window is out of sight.
 
-const { call, failed } = window.detent;
+const { call, asking, failed } = window.detent;
 const HELD = 300; // ms between two words that a key is held
 
 /**
@@ -30,9 +30,10 @@ export function holding(buttons, { name, rate, sent, stopped }) {
     if (speed === null) return;
     button.classList.add("down");
     held = name();
-    const mine = (timer = setInterval(() => call("unit_held", held).catch(() => {}), HELD));
+    const ask = asking(); // a key that somebody has stopped does not hold what is begun after that
+    const mine = (timer = setInterval(() => ask("unit_held", held).catch(() => {}), HELD));
     try {
-      const lines = await call("unit_hold", held, speed);
+      const lines = await ask("unit_hold", held, speed);
       if (timer === mine) sent(lines, held);
     } catch (error) {
       if (timer !== mine) return;

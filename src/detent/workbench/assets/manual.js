@@ -3,7 +3,7 @@
 import { remeasured, wholeSteps } from "./forms.js";
 import { holding } from "./holding.js";
 
-const { part, on, get, call, toast, failed, remembered, remember } = window.detent;
+const { part, on, get, call, asking, toast, failed, remembered, remember } = window.detent;
 
 part("manual", (box) => {
   const facts = JSON.parse(box.dataset.facts);
@@ -33,9 +33,9 @@ part("manual", (box) => {
   }
 
   /** The unit, with a host that speaks to it: connected to at the first touch. */
-  async function there() {
+  async function there(ask = asking()) {
     if (get("held") && !get("real")) throw new Error("The cell stands, and its unit cannot answer: let time go on first.");
-    return call("unit_connect", facts.model, facts.address, facts.options, name);
+    return ask("unit_connect", facts.model, facts.address, facts.options, name);
   }
 
   /** @param {string} text */
@@ -45,10 +45,11 @@ part("manual", (box) => {
 
   /** @param {"jog" | "go" | "zero" | "home"} what */
   async function move(what, value = 0) {
+    const ask = asking(); // while it is connected to, somebody may press STOP
     try {
       const steps = wholeSteps(value);
-      await there();
-      told(await call("unit_move", name, what, steps));
+      await there(ask);
+      told(await ask("unit_move", name, what, steps));
     } catch (error) {
       failed(error);
     }
@@ -75,7 +76,8 @@ part("manual", (box) => {
   });
   role("zero").addEventListener("click", () => move("zero"));
   for (const button of box.querySelectorAll("[data-home]")) button.addEventListener("click", () => move("home", Number(button.dataset.home)));
-  role("stop").addEventListener("click", () => stopped(name, there().then(() => call("unit_stop", name))));
+  // a stop does not wait for the connection: what does wait for that is ended by it
+  role("stop").addEventListener("click", () => stopped(name, Promise.all([there(), call("unit_stop", name)]).then(([, told]) => told)));
   const hold = holding([...box.querySelectorAll("[data-hold]")], {
     name: () => name,
     rate: (/** @type {Part} */ button) => {

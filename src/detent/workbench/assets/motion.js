@@ -488,8 +488,8 @@ export class Motion {
    */
   get actions() {
     return {
-      send: () => this.whenSendable("send", (move) => this.sending.settings(move.settings)),
-      move: () => this.whenSendable("move", (move) => this.sending.move([...move.settings, move.go])),
+      send: () => this.whenSendable("send", (move, ask) => this.sending.settings(move.settings, ask)),
+      move: () => this.whenSendable("move", (move, ask) => this.sending.move([...move.settings, move.go], ask)),
       now: () => this.show(this.tab),
       keep: () =>
         this.whenSettled(() => {
@@ -530,11 +530,12 @@ export class Motion {
   /**
    * The same for what goes to a unit: nothing does if the settings that are meant are no commands.
    * @param {string} key
-   * @param {(move: DrawnMove) => any} act
+   * @param {(move: DrawnMove, ask: Detent["call"]) => any} act
    */
   async whenSendable(key, act) {
-    const move = await this.settled();
-    if (move && !this.find(`[data-key=${key}]`).disabled) await act(move);
+    const ask = detent.asking(), // a STOP may come before it is settled
+      move = await this.settled();
+    if (move && !this.find(`[data-key=${key}]`).disabled) await act(move, ask);
   }
 
   current() {

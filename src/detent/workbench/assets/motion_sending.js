@@ -23,16 +23,22 @@ export class Sending {
     });
   }
 
-  /** @param {string[]} lines */
-  async settings(lines, words = "") {
+  /**
+   * @param {string[]} lines
+   * @param {Detent["call"]} ask whose hand it was
+   */
+  async settings(lines, ask, words = "") {
     const { about } = this.motion;
-    if (about.real && !(await this.shown(about, lines, words))) return;
-    await this.send(about, lines);
+    if (!about.real) await this.send(about, lines, ask);
+    else if (await this.shown(about, lines, words)) await this.send(about, lines);
   }
 
-  /** @param {string[]} lines */
-  async move(lines) {
-    await this.settings(lines, "The motor moves.");
+  /**
+   * @param {string[]} lines
+   * @param {Detent["call"]} ask
+   */
+  async move(lines, ask) {
+    await this.settings(lines, ask, "The motor moves.");
   }
 
   /**
@@ -56,10 +62,10 @@ export class Sending {
 
   /**
    * Line by line, to the unit that they were shown for, whatever the page shows by now; nothing follows a line that is
-   * refused.
+   * refused, nor a STOP.
    * @param {string[]} lines
    */
-  async send(/** @type {AxisFacts} */ { unit, real }, lines) {
+  async send(/** @type {AxisFacts} */ { unit, real }, lines, ask = window.detent.asking()) {
     const sent = [];
     if (real) {
       // one job of the unit: STOP, in whichever window, ends all of it
@@ -72,7 +78,12 @@ export class Sending {
       if (refused >= 0) return this.tell(lines.slice(0, refused), lines[refused], `was refused: ${told[refused].meaning || told[refused].answers.join(" ")}`);
       sent.push(...lines);
     } else for (const line of lines) {
-      if ((await this.motion.ask("type", unit, line)) === undefined) return this.tell(sent, line, "was not sent");
+      try {
+        await ask("type", unit, line);
+      } catch (error) {
+        window.detent.failed(error);
+        return this.tell(sent, line, "was not sent");
+      }
       sent.push(line);
     }
     this.told.textContent = `sent: ${sent.join(", ")}; the answers are on the ${real ? "Unit" : "Terminal"} page`;

@@ -29,6 +29,9 @@ const GIVEN_UP = 20000; // ms: then a new connection is tried, as this one may h
 let socket = null;
 /** @type {number | null} the clock of the server, as it was heard last: it does nothing late that moves something */
 let beat = null;
+/** What stops something; the server counts those of this window likewise. */
+const STOPS = new Set(["stop_all", "unit_stop", "stop_motors"]);
+let own = 0; // stops that were called on this socket
 const silence = new Silence(MUTE, performance.now());
 let calls = 0;
 let pause = 250; // ms before the next attempt to connect
@@ -40,6 +43,7 @@ function connect() {
   const mine = (socket = new WebSocket(`${scheme}//${location.host}/live`));
   mine.onopen = () => {
     pause = 250;
+    own = 0;
     silence.heard(performance.now());
     document.documentElement.dataset.link = "up";
     for (const go of opening.splice(0)) go();
@@ -83,21 +87,32 @@ function listenForSilence() {
  * Make a call; it waits a while for the connection, if there is none.
  * @type {Detent["call"]}
  */
-function call(name, ...args) {
-  return name in STANDS ? meanings.make("held", STANDS[name], () => say(name, args)) : say(name, args);
+const call = (name, ...args) => asking()(name, ...args);
+
+/**
+ * Calls that belong together: whoever begins them knows the stops up to now. Of what moves nothing is done behind a later
+ * one, in whichever window it was pressed.
+ * @type {Detent["asking"]}
+ */
+function asking() {
+  const known = { stops: values.get("stop.count") ?? 0, own, socket };
+  return (name, ...args) => (name in STANDS ? meanings.make("held", STANDS[name], () => say(name, args, known)) : say(name, args, known));
 }
 
 /**
  * @param {string} name
  * @param {any[]} args
+ * @param {{stops: number, own: number, socket: WebSocket | null}} known
  * @returns {Promise<any>}
  */
-async function say(name, args) {
+async function say(name, args, known) {
   if (!socket || socket.readyState !== WebSocket.OPEN) await connected();
+  const stops = [known.stops, known.socket === socket ? known.own : 0];
+  if (STOPS.has(name)) own += 1;
   return new Promise((resolve, reject) => {
     calls += 1;
     waiting.set(calls, [resolve, reject]);
-    socket?.send(JSON.stringify({ call: name, args, id: calls, heard: beat }));
+    socket?.send(JSON.stringify({ call: name, args, id: calls, heard: beat, stops }));
   });
 }
 
@@ -508,7 +523,7 @@ function followTabs() {
 }
 
 window.detent = {
-  part, on, frame, call, action, turnTime, toast, failed, onTheme, theme, remembered, remember, seconds, grouped,
+  part, on, frame, call, asking, action, turnTime, toast, failed, onTheme, theme, remembered, remember, seconds, grouped,
   meant: (key, now = values.get(key)) => meanings.of(key, now),
   underWay: (key) => meanings.underWay(key),
   make: (key, value, going) => meanings.make(key, value, going),

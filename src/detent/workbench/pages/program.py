@@ -46,6 +46,7 @@ class _Key(NamedTuple):
     help: str
     more: str = ""  # attributes
     icons: tuple[str, ...] = ()
+    unreal: bool = False  # where a machine is driven it is refused, and so not offered
 
 
 _FILES = (
@@ -68,11 +69,11 @@ _SCRIPT = (
 )
 _DEBUGGER = (
     _Key("go", "Go", "Pause or go (F8)", ' data-pressed="held"', ("go", "pause")),
-    _Key("step", "Step", "To the next instruction (F10)", icons=("step",)),
+    _Key("step", "Step", "To the next instruction (F10)", icons=("step",), unreal=True),
     _Key("back", "Back", "To the instruction before (Shift-F10)", icons=("back",)),
-    _Key("cursor", "To cursor", "Run to the line of the cursor (F4)"),
-    _Key("break", "Break", "Breakpoint here, or none (F9)"),
-    _Key("errors", "On errors", "Stop whenever a unit refuses something", ' data-pressed="breakerrors"'),
+    _Key("cursor", "To cursor", "Run to the line of the cursor (F4)", unreal=True),
+    _Key("break", "Break", "Breakpoint here, or none (F9)", unreal=True),
+    _Key("errors", "On errors", "Stop whenever a unit refuses something", ' data-pressed="breakerrors"', unreal=True),
 )
 
 
@@ -81,6 +82,7 @@ def _keys(keys: "Sequence[_Key]", kind: str) -> str:
     made = ""
     for key in keys:
         classes = f"key{kind}" + (" primary" if key.name in ("run", "send") else " go" if key.name == "go" else "")
+        classes += " unreal" * key.unreal
         icons = "".join(
             f'<i class="{when}">{icon(name)}</i>'
             for name, when in zip(key.icons, ("when-held", "when-going"), strict=False)

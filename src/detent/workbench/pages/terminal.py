@@ -16,6 +16,7 @@ from detent.workbench.line_scripts import LineScripts
 from detent.workbench.live import Live
 from detent.workbench.messages import LinePicture, Picture
 from detent.workbench.pages import Page, Window
+from detent.workbench.stops import BOARDS
 from detent.workbench.talk import Row
 from detent.workbench.words import words
 
@@ -58,7 +59,7 @@ def offer(site: "FastAPI", bench: "Bench", live: Live) -> None:
         scripts.stop(line)
 
     for call in (terminal, run_script, repeat_command, stop_script):
-        live.offer(call.__name__, call, fresh=call in (run_script, repeat_command))
+        live.offer(call.__name__, call, moves=BOARDS if call in (run_script, repeat_command) else "")
 
 
 def _row(row: Row) -> LineRow:

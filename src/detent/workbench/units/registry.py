@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Awaitable, Callable, Sequence
 from difflib import unified_diff
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, cast
 
@@ -26,7 +27,8 @@ from detent.workbench.answers import BackupDifferences, LineSaid, UnitRow, UnitT
 from detent.workbench.beside import beside
 from detent.workbench.folder import Folder
 from detent.workbench.live import Live
-from detent.workbench.stopping import Stopping
+from detent.workbench.stopping import StopFailed, Stopping
+from detent.workbench.stops import UNITS
 from detent.workbench.talk import Row
 from detent.workbench.units import manual
 from detent.workbench.units.backups import backup_of, check_fits, explained, file_before
@@ -46,7 +48,8 @@ Text = Annotated[str, Field(max_length=1 << 20)]
 Rate = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
 ManualMove = Literal["jog", "go", "zero", "home"]
 MOST = 16  # units at once
-MOVING = ("unit_move", "unit_hold", "unit_say", "unit_lines", "unit_both", "unit_store", "unit_restore")  # a real unit
+MOVING = ("unit_move", "unit_hold", "unit_held", "unit_say", "unit_lines", "unit_both", "unit_store", "unit_restore")
+"""What moves a real unit, or may."""
 
 
 class Units:
@@ -57,35 +60,60 @@ class Units:
         self._live, self._stopping, self._folder, self._state = live, stopping, folder, state
         self._units: dict[str, Unit] = {}
         self._leaving: set[asyncio.Task[None]] = set()
-        self._connecting = asyncio.Lock()  # two clicks are one connection
+        self._coming: dict[str, asyncio.Task[Unit]] = {}  # those that are being connected to: two clicks are one
+        self._connecting = asyncio.Lock()  # one after the other: who shares a line must know who is there
         self._turning = asyncio.Lock()  # the last word counts, not the last to be done
         live.put({"r.names": []})
         for call in (self.unit_connect, self.unit_again, self.unit_leave, self.unit_say, self.unit_lines,
                      self.unit_both, self.unit_move, self.unit_hold, self.unit_held, self.unit_stop,
                      self.unit_asking, self.unit_talk, self.unit_source, self.unit_compare, self.unit_store,
                      self.unit_backup, self.unit_differs, self.unit_restore):  # fmt: skip
-            live.offer(call.__name__, call, fresh=call.__name__ in MOVING)
+            name = call.__name__
+            live.offer(name, call, moves=UNITS if name in MOVING else "", stops=name == "unit_stop")
 
     # -- connecting --------------------------------------------------------------------------------------
 
     async def unit_connect(self, model: Name, address: Name, options: Line = "", name: Name = "") -> str:
         """Connect to a unit and look at it from now on; how it is called. Raises ValueError, PortError."""
         name = name or " ".join(word for word in (model, address, options) if word)
-        async with self._connecting:
-            if name not in self._units:
-                await self._connect(name, model, address, options)
+        if name not in self._units:
+            coming = self._coming.get(name)
+            if coming is None:
+                coming = self._coming[name] = asyncio.create_task(self._connect(name, model, address, options))
+                self._stopping.add(name, partial(self._stop_coming, name, coming))
+                coming.add_done_callback(lambda _: self._came(name))
+            await asyncio.shield(coming)
         return name
 
-    async def _connect(self, name: str, model: str, address: str, options: str) -> None:
-        if len(self._units) >= MOST:
-            raise ValueError(f"{MOST} units are connected: leave one of them first")
-        beside = next((unit for unit in self._units.values() if unit.address == address), None)
-        unit = await Unit.open(name, model, address, options_of(options), self._tell, beside)
+    async def _connect(self, name: str, model: str, address: str, options: str) -> Unit:
+        async with self._connecting:
+            if len(self._units) >= MOST:
+                raise ValueError(f"{MOST} units are connected: leave one of them first")
+            beside = next((unit for unit in self._units.values() if unit.address == address), None)
+            unit = await Unit.open(
+                name, model, address, options_of(options), self._tell, self._live.stops, beside
+            )  # fmt: skip
         self._units[name] = unit
         self._stopping.add(name, unit.stop)
         self._tell(unit)
         self._live.put({"r.names": list(self._units)})
         unit.begin()
+        return unit
+
+    def _came(self, name: str) -> None:
+        """It is connected to, or not."""
+        coming = self._coming.pop(name)
+        if coming.cancelled() or coming.exception() is not None:
+            self._stopping.remove(name)
+
+    async def _stop_coming(self, name: str, coming: "asyncio.Task[Unit]") -> str:
+        """Stop a unit that is being connected to, once it is; nothing that was asked for before moves it."""
+        self._live.stops.stop(name)
+        try:
+            unit = await asyncio.shield(coming)
+        except (ValueError, OSError) as error:
+            raise StopFailed(f"it cannot be connected to, so nothing was sent: {told(error)}") from error
+        return await unit.stop()
 
     async def unit_again(self, name: Name) -> None:
         """After the port was lost, or the unit did not answer."""
@@ -129,6 +157,8 @@ class Units:
 
     async def close(self) -> None:
         """Let go of all of them."""
+        for coming in self._coming.values():
+            coming.cancel()
         for name in list(self._units):
             with contextlib.suppress(OSError):
                 await self.unit_leave(name)
@@ -174,8 +204,12 @@ class Units:
         self._unit(name).still_held()
 
     async def unit_stop(self, name: Name) -> str:
-        """Stop one unit; once more stops it at once. Raises StopFailed."""
-        return await self._unit(name).stop()
+        """Stop one unit, if it is still being connected to as soon as it is; once more stops it at once.
+
+        Raises StopFailed.
+        """
+        coming = self._coming.get(name)
+        return await (self._unit(name).stop() if coming is None else self._stop_coming(name, coming))
 
     async def _shown(self, unit: Unit, action: Awaitable[object]) -> list[str]:
         """Do it; the lines that were sent meanwhile."""

@@ -18,6 +18,7 @@ from detent.pins import HIGH, LOW, Level
 from detent.realtime.connect import connect_async, host
 from detent.workbench.live import Value
 from detent.workbench.stopping import StopFailed
+from detent.workbench.stops import UNITS, Overtaken, Stops
 from detent.workbench.units.asked import Look, look
 from detent.workbench.units.manual import ManualMoves, check_moves, manual_moves
 from detent.workbench.units.manual import run as run_at
@@ -80,13 +81,15 @@ class Unit:
         address: str,
         options: Mapping[str, Any],
         told: Callable[["Unit"], None],
+        stops: Stops,
         beside: "Unit | None" = None,
     ) -> "Unit":
         """The unit of `model` at `address`, as `connect` takes both. `told` is called when `facts` have changed.
 
-        `beside`: a unit on the same line, whose port they share. Raises ValueError, PortError.
+        Nothing is done with it that was asked before its last of `stops`. `beside`: a unit on the same line, whose port
+        they share. Raises ValueError, PortError.
         """  # fmt: skip
-        unit = cls(name, model, address, told)
+        unit = cls(name, model, address, told, stops)
         port = address if beside is None else beside.tap.port
         shell = await connect_async(model, port, watch=unit._watch, **options)
         transcript = Transcript(phrases(model, options), numbers=model == "supersigma")
@@ -104,9 +107,11 @@ class Unit:
     tap: Tap
     manual: ManualMoves
 
-    def __init__(self, name: str, model: str, address: str, told: Callable[["Unit"], None]) -> None:
+    def __init__(
+        self, name: str, model: str, address: str, told: Callable[["Unit"], None], stops: Stops
+    ) -> None:  # fmt: skip
         """Use `open`."""
-        self.name, self.model, self.address, self._told = name, model, address, told
+        self.name, self.model, self.address, self._told, self._stops = name, model, address, told, stops
         self.party: Party[Unit] = Party()
         self.written = ""  # its options
         self.paused = False
@@ -176,8 +181,9 @@ class Unit:
     async def perform(self, what: str, steps: Steps[T]) -> T:
         """Carry out an operation of the plain driver. It goes on if who asked for it goes away; `stop` breaks it off.
 
-        Raises UnitBusy, DriverError, ValueError.
+        Raises UnitBusy, Overtaken, DriverError, ValueError.
         """
+        self._stops.check(UNITS, self.name)
         if self.tap.lost:
             raise UnitBusy(NOT_ALIVE.format(self.tap.lost))
         if self._stopping is not None or self._doing is not None:
@@ -242,6 +248,7 @@ class Unit:
         What others do on its line is broken off, too, but not their stops. In words what was done. Raises StopFailed
         where the unit has confirmed neither.
         """
+        self._stops.stop(self.name)
         before, self._held_until = self._stopping, 0.0
         if before is not None:
             before.cancel()
@@ -330,7 +337,7 @@ class Unit:
         self._guard = asyncio.create_task(self._dead_man())
         try:
             await self.perform("jog", run_at(driver, rate))
-        except (UnitBusy, Refused, ValueError):  # it does not run for this
+        except (UnitBusy, Overtaken, Refused, ValueError):  # it does not run for this
             if not already:
                 self._held_until = 0.0
             raise
@@ -349,7 +356,8 @@ class Unit:
             await asyncio.sleep(WATCH)
 
     def still_held(self) -> None:
-        """The key is still held."""
+        """The key is still held. Raises Overtaken where it was stopped since the key was pressed."""
+        self._stops.check(UNITS, self.name)
         if self._held_until:
             self._held_until = asyncio.get_running_loop().time() + HOLD_SECONDS
 
