@@ -112,3 +112,28 @@ def test_a_computer_that_slept_recovers_at_the_first_time(slept: Ns) -> None:
         state = bench.driven.axes()[0]
         assert state.standing is Standing.DRIVEN, state.why
         assert state.shaft == bench.position("x")
+
+
+@pytest.mark.parametrize("frequency", [16_000_000, 520_000_000])
+@pytest.mark.parametrize("wraps", [0.4, 0.6, 0.9, 1.4, 7.7])
+def test_a_cell_answers_as_soon_as_its_computer_has_slept(frequency: int, wraps: float) -> None:
+    """Whatever part of the 32 bits of the board's clock has gone by meanwhile: its time goes on, and never stands.
+
+    A cell that stood would make what it is told now a minute later, when nobody expects a motion any more.
+    """
+    outputs = ('enable = "gpio4"', 'outputs = { MOV = "gpio6", RDY = "!gpio7", RAMP = "gpio8" }')
+    with Bench(GS.replace(outputs[0], "").replace(outputs[1], ""), board={"frequency": frequency}) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+100")
+        bench.run(SECOND)
+        bench.rest()
+        bench.ports["b"].stand(-round(wraps * (1 << 32) * SECOND / frequency))
+        bench.run(1200 * MS)
+        before = bench.cell.now
+        bench.run(300 * MS)
+        assert 299 * MS <= bench.cell.now - before <= 302 * MS
+        bench.type("x", "+10")
+        bench.run(500 * MS)
+        assert bench.said("x").endswith("Y\r")
+        assert bench.position("x") == bench.driven.axes()[0].shaft == 110
+        assert bench.driven.axes()[0].standing is Standing.DRIVEN

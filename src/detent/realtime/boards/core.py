@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from detent.outputs.steps import Scale
-from detent.realtime.boards.clock import Clock, nearest
+from detent.realtime.boards.clock import Clock
 from detent.realtime.boards.dictionary import BARE, Dictionary, Message, Value
 from detent.realtime.boards.events import Event
 from detent.realtime.boards.link import Link
@@ -104,10 +104,6 @@ class Core:
     def after_lead(self, wall: WallNs) -> int:
         """The tick a lead from now, for what has no time of its own: a host that is kept away is not late with it."""
         return self.clock.tick_at(wall) + self.ticks(self.setup.lead)
-
-    def whole(self, message: Message, field: str, wall: WallNs) -> int:
-        """A clock in a message, of which 32 bits came, as a whole count."""
-        return nearest(message.number(field), self.clock.tick_at(wall))
 
     def comes(self, tick: int) -> None:
         """What is said now is for that tick, and has to be there before."""

@@ -55,7 +55,7 @@ class Probes:
 
     def _clocked(self, message: Message, wall: WallNs) -> None:
         core = self._core
-        tick = core.whole(message, "clock", wall)
+        tick = core.clock.extend(message.number("clock"), wall)
         if not core.clock.note(tick, self._sent, wall):
             self.ask(wall)  # the next one says which of them was wrong
         elif self._left:

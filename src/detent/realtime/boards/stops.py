@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from detent.realtime.boards.clock import nearest
 from detent.realtime.boards.core import MASK, UNSURE, Core
 from detent.realtime.boards.dictionary import Message, Value
 from detent.realtime.boards.events import Stopped
@@ -349,6 +350,8 @@ class Stop:
         self._armed.clear()
         waiting = {("stepper_position", oid) for oid in self._axis.oids}
         base = core.scale
+        # it was before the time-out; a computer that was away since knows no better, and 32 bits may have gone round
+        near = self._before[-1].tick if self._before else core.clock.tick_at(wall)
 
         def came(message: Message, at: WallNs) -> None:
             waiting.discard((message.name, message.number("oid")))
@@ -360,7 +363,7 @@ class Stop:
                 self._read(asked.setup.name, present, at)
                 if asked is watched and self._firing is not None:
                     sample = core.ticks(asked.setup.sample)
-                    edge = core.whole(message, "next_clock", at) - sample
+                    edge = nearest(message.number("next_clock"), near) - sample
                     stop = edge + (asked.setup.samples - 1) * sample
                     scale = base.later(self._axis.lag_at(stop))
                     self._firing = self._firing._replace(at=scale.time(stop), edge=scale.time(edge))
