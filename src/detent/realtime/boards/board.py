@@ -454,6 +454,7 @@ class Board:
     def _fall(self, state: State) -> None:
         self.state = state
         self.core.forget_questions()
+        self._probes.break_off()
         self._recovering = self.wants_reopening = False  # whoever stopped it has to say that it may come back
         self._wait_until = self._setting = self._restarted_at = None
         self._equipment.fall(shut_down=state is State.SHUT_DOWN)

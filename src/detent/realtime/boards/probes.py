@@ -36,6 +36,10 @@ class Probes:
         self._then, self._left = then, FIRST
         self.ask(wall)
 
+    def break_off(self) -> None:
+        """Nobody waits any more until the clock is known; it is asked for from time to time as before."""
+        self._left = 0
+
     def _uptime(self, message: Message, wall: WallNs) -> None:
         whole = (message.number("high") & 0xFFFFFFFF) << 32 | message.number("clock") & 0xFFFFFFFF
         self._core.clock.note(whole, wall, wall)
