@@ -16,6 +16,7 @@ from detent.ticks import MS, SECOND, Ns
 
 MASK = 0xFFFFFFFF
 ASK_AGAIN: WallNs = 40 * MS  # an answer that was lost on the way is asked for again
+AHEAD: Ns = 1000 * MS  # nothing is said for later, however late its unit is: 32 bits are no more than 4 s at 520 MHz
 UNSURE: Ns = 1 * MS  # how far the clock's estimate may be off, generously
 
 
@@ -100,6 +101,10 @@ class Core:
     def soonest(self, wall: WallNs) -> int:
         """The first tick for which something may still be sent at `wall`."""
         return self.clock.tick_at(wall) + self.ticks(self.setup.margin)
+
+    def reach(self, wall: WallNs) -> int:
+        """The last tick for which something may be sent at `wall` already."""
+        return self.clock.tick_at(wall) + self.ticks(AHEAD)
 
     def after_lead(self, wall: WallNs) -> int:
         """The tick a lead from now, for what has no time of its own: a host that is kept away is not late with it."""
