@@ -4,10 +4,11 @@ No crystal does that; a board that is a process on a busy computer does, and so 
 was known of the clock is wrong then, and a line through what was seen before and behind would be wrong for long.
 """
 
+from itertools import pairwise
 from random import Random
 
 import pytest
-from tests.realtime.boards.driven_bench import Bench
+from tests.realtime.boards.driven_bench import Bench, pulses
 from tests.realtime.boards.test_stalls import GS
 
 from detent.realtime.boards.clock import Clock
@@ -112,3 +113,79 @@ def test_a_computer_that_slept_recovers_at_the_first_time(slept: Ns) -> None:
         state = bench.driven.axes()[0]
         assert state.standing is Standing.DRIVEN, state.why
         assert state.shaft == bench.position("x")
+
+
+@pytest.mark.parametrize("frequency", [16_000_000, 520_000_000])
+@pytest.mark.parametrize("wraps", [0.4, 0.6, 0.9, 1.4, 7.7])
+def test_a_cell_answers_as_soon_as_its_computer_has_slept(frequency: int, wraps: float) -> None:
+    """Whatever part of the 32 bits of the board's clock has gone by meanwhile: its time goes on, and never stands.
+
+    A cell that stood would make what it is told now a minute later, when nobody expects a motion any more.
+    """
+    outputs = ('enable = "gpio4"', 'outputs = { MOV = "gpio6", RDY = "!gpio7", RAMP = "gpio8" }')
+    with Bench(GS.replace(outputs[0], "").replace(outputs[1], ""), board={"frequency": frequency}) as bench:
+        bench.run(100 * MS)
+        bench.type("x", "+100")
+        bench.run(SECOND)
+        bench.rest()
+        bench.ports["b"].stand(-round(wraps * (1 << 32) * SECOND / frequency))
+        bench.run(1200 * MS)
+        before = bench.cell.now
+        bench.run(300 * MS)
+        assert 299 * MS <= bench.cell.now - before <= 302 * MS
+        bench.type("x", "+10")
+        bench.run(500 * MS)
+        assert bench.said("x").endswith("Y\r")
+        assert bench.position("x") == bench.driven.axes()[0].shaft == 110
+        assert bench.driven.axes()[0].standing is Standing.DRIVEN
+
+
+TWO = "".join(
+    f"""
+[units.{unit}]
+model = "gs-c200s"
+straps = {{ CHS = "low" }}
+[boards.{unit}]
+serial = "fake {unit}"
+[hardware.{unit}]
+board = "{unit}"
+step = "gpio2"
+dir = "gpio3"
+unwired = ["EOT", "HOME"]
+"""
+    for unit in "ab"
+)
+
+
+@pytest.mark.parametrize("seed", [9, 11, 16, 22])
+def test_two_boards_whose_clocks_part_keep_to_the_speed_of_their_motors(seed: int) -> None:
+    """One clock is known to have parted sooner than the other: a line through both would be steep, or run backwards."""
+    random = Random(seed)
+    frequency = random.choice([12_000_000, 16_000_000, 520_000_000])
+    with Bench(TWO, board={"frequency": frequency}, port={"drift": random.choice([-100, 0, 150])}) as bench:
+        bench.keep()
+        bench.run(100 * MS + random.randrange(SECOND))
+        for _ in range(5):
+            for unit in "ab":
+                bench.type(unit, f"{random.choice('+-')}{random.randrange(1, 900)}")
+            bench.run(random.randrange(900 * MS))
+            which = random.choice([["a"], ["b"], ["a", "b"], []])
+            span = random.choice([5 * MS, 30 * MS, 400 * MS, 3 * SECOND]) * random.choice([-1, -1, 1])
+            for name in which:
+                bench.ports[name].stand(min(span, SECOND))
+            bench.run(random.randrange(2 * SECOND))
+            bench.driven.recover()
+            bench.run(random.randrange(600 * MS))
+        bench.run(6 * SECOND)
+        bench.driven.recover()
+        bench.run(3 * SECOND)
+        for unit in "ab":
+            bench.type(unit, "+20")
+        bench.rest()
+        for state, ledger in zip(bench.driven.axes(), bench.driven.ledgers, strict=True):
+            assert state.standing is Standing.DRIVEN, state.why
+            assert state.shaft == bench.position(state.unit)
+            told = pulses(ledger.motions.since(0), bench.cell.now)
+            least = min(after[0] - before[0] for before, after in pairwise(told))
+            edges = bench.edges(state.unit)
+            assert min(after[0] - before[0] for before, after in pairwise(edges)) * SECOND > 0.98 * least * frequency

@@ -8,6 +8,7 @@ import pytest
 from tests.generated import seeds
 from tests.realtime.boards.driven_bench import Bench, pulses
 
+from detent.realtime.boards.board import State
 from detent.realtime.boards.events import Stopped
 from detent.realtime.boards.fake.board import FakeBoard
 from detent.realtime.boards.states import Severity, Standing
@@ -445,6 +446,7 @@ def test_an_emergency_stop_while_a_board_comes_back_stands_until_the_next_recove
         bench.type("x", "+10")
         bench.run(200 * MS)
         assert bench.driven.axes()[0].standing is Standing.FAULT
+        assert bench.boards.master.state is not State.READY
         assert bench.position("x") == stopped
         bench.driven.recover()
         bench.run(3 * SECOND)

@@ -27,7 +27,7 @@ from detent.realtime.boards.setup import (
     SetupProblem,
     StepperSetup,
 )
-from detent.ticks import MS, SECOND, US
+from detent.ticks import MS, SECOND, US, Ns
 
 ENDLESS = constant_acceleration.move(1000, 1000, 1, None).train
 
@@ -283,6 +283,49 @@ def test_a_board_with_another_configuration_is_started_again() -> None:
         second.rest()
         assert second.boards.steppers["slide"].counted() == 50
         assert first.boards.ready
+
+
+def test_a_board_that_keeps_its_port_is_started_again_too() -> None:
+    """At a UART the port stays when the board is reset."""
+
+    class AtUart(FakeBoard):
+        def power_cycle(self) -> None:
+            super().power_cycle()
+            self.gone = False
+
+    fake = AtUart(slide())
+    Bench([(setup(), FakePort(fake))])
+    second = Bench([(setup(outputs=(MOV,)), FakePort(fake))])
+    assert second.of(Ready)[0].restarted
+    assert fake.resets == 1
+
+
+@pytest.mark.parametrize("gone_for", [0, 400 * MS])
+@pytest.mark.parametrize("wait", [0, 200 * US, 20 * MS, 300 * MS])
+def test_a_board_that_is_stopped_while_it_starts_again_waits_for_recover(wait: Ns, gone_for: Ns) -> None:
+    """It does not come back by itself, and when it does, it is said that nobody knows where its axis stands."""
+    made = bench()
+    made.ports[0].unplugged = True
+    made.run(1500 * MS)
+    made.board.power_cycle()
+    made.board.finalized, made.board.crc = True, 77  # another host had it meanwhile
+    made.ports[0].unplugged = False
+    made.boards.recover(made.wall)
+    made.until(lambda: made.boards.master.wants_reopening)
+    end = made.wall + wait
+    while made.wall < end:
+        made.turn(min(end, made.wall + 50 * US))
+        made.ports[0].unplugged = made.ports[0].unplugged or bool(gone_for and made.board.resets == 2)
+    made.boards.emergency_stop(made.wall)
+    made.run(gone_for)
+    made.ports[0].unplugged = False
+    made.run(3 * SECOND)
+    assert not made.boards.ready
+    assert not made.of(Recovered) or wait == 300 * MS
+    made.boards.recover(made.wall)
+    made.until(lambda: made.boards.ready)
+    assert len(made.of(Ready)) == 1  # at the start
+    assert made.of(Recovered)[0].shafts == {"slide": None}
 
 
 def refusal(made: BoardSetup, fake: FakeBoard | None = None, port: dict[str, Any] | None = None) -> Refusal:

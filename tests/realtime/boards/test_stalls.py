@@ -196,3 +196,54 @@ def test_a_stall_anywhere_is_a_slip_in_many_sessions(writes: bool) -> None:
     counts = [session(seed, writes=writes) for seed in range(100, 700)]
     assert sum(slips for slips, _ in counts) > 800
     assert sum(down for _, down in counts) <= (40 if writes else 0)
+
+
+OPEN = GS.replace('inputs = { EOT = "^gpio10", HOME = "^gpio11", ENABLE = "^gpio12" }', 'unwired = ["EOT", "HOME"]')
+"""Nothing takes back what it does, so that outputs are given to the board as soon as they are known."""
+BARE = OPEN.replace('enable = "gpio4"', "").replace('outputs = { MOV = "gpio6", RDY = "!gpio7", RAMP = "gpio8" }', "")
+WATCHED = BARE.replace('unwired = ["EOT", "HOME"]', 'inputs = { EOT = "^gpio10", HOME = "^gpio11" }')
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_unit_that_is_late_has_its_outputs_within_their_watchdog(seed: int) -> None:
+    """The firmware takes no change for later than the end of the watchdog, and shuts down where it is told one."""
+    random = Random(seed)
+    with Bench(OPEN.replace('lead = "30 ms"', 'lead = "30 ms"\nwatchdog = "200 ms"')) as bench:
+        bench.run(100 * MS)
+        bench.type("x", f"+{random.randrange(100, 900)}")
+        bench.run(random.randrange(60, 100) * MS)
+        bench.stall(148 * MS)
+        bench.run(2 * SECOND)
+        bench.rest()
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.DRIVEN, state.why
+        assert state.slips == 1
+        assert state.shaft == bench.position("x")
+        bench.check_outputs()
+
+
+@pytest.mark.parametrize(("away", "text"), [(5 * SECOND, WATCHED), (9 * SECOND, BARE)])
+def test_a_unit_may_be_later_than_its_clock_counts(away: Ns, text: str) -> None:
+    """A process that was stopped goes on as late as it is; the 32 bits of the board's clock go round in 8 s."""
+    with Bench(text, board={"frequency": 520_000_000}) as bench:
+        bench.keep()
+        bench.run(100 * MS)
+        bench.type("x", "+3000")
+        bench.run(300 * MS)
+        bench.stall(away)
+        bench.run(2 * SECOND)
+        bench.type("x", "Z")
+        for rest in (200 * MS, 2500 * MS, 5 * SECOND):
+            bench.run(rest)
+            bench.type("x", "-400")
+        bench.run(5 * SECOND)
+        bench.rest(100 * SECOND)
+        state = bench.driven.axes()[0]
+        assert state.standing is Standing.DRIVEN, state.why
+        assert state.shaft == bench.position("x")
+        edges = bench.edges("x")
+        told = pulses(bench.driven.ledgers[0].motions.since(0), bench.cell.now)
+        assert [place for _, place in edges] == [place for _, place in told]
+        for (tick, after), (at, following) in zip(pairwise(edges), pairwise(told), strict=True):
+            if following[0] - at[0] < away:  # a rest as long as the lag is: in time again behind it
+                assert after[0] - tick[0] >= (following[0] - at[0] - 2 * US) * 520 // 1000

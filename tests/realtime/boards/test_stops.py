@@ -12,7 +12,7 @@ from detent.ramps import constant_acceleration
 from detent.realtime.boards.events import CountDiffers, InputChanged, Ready, Stopped
 from detent.realtime.boards.fake.machine import MachineSwitch
 from detent.realtime.boards.guard import Guard
-from detent.ticks import MS, SECOND, US
+from detent.ticks import MS, SECOND, US, Ns
 
 LIMIT = MachineSwitch("slide", "gpio10", 500, 1 << 30, inside=False)  # EOT: low beyond
 
@@ -56,6 +56,23 @@ def test_it_stops_on_the_step_that_closed_the_switch(rate: int) -> None:
     made.run(200 * MS)
     assert made.machine.axes["slide"].position == edge
     assert not made.of(CountDiffers)
+
+
+@pytest.mark.parametrize("away", [1 * SECOND, 3 * SECOND, 5 * SECOND, 7 * SECOND, 60 * SECOND])
+@pytest.mark.parametrize("frequency", [12_000_000, 520_000_000])
+def test_when_it_was_is_known_however_long_the_computer_was_away(frequency: int, away: Ns) -> None:
+    """The instant comes in the 32 bits of a clock that goes round in 8 s at 520 MHz."""
+    made = bench(MachineSwitch("slide", "gpio10", 40, 1 << 30, inside=False), board={"frequency": frequency})
+    started = move(made, None, 1, 200)
+    made.run(205 * MS)
+    assert not made.of(Stopped)
+    made.turn(made.wall + away)
+    made.until(lambda: bool(made.of(Stopped)))
+    [stop] = made.of(Stopped)
+    assert stop.input == "EOT"
+    assert stop.shaft == made.machine.axes["slide"].position == 40
+    assert 0 <= stop.edge - started.train.time_of(40) <= 55 * US
+    assert stop.edge <= stop.at <= stop.edge + 51 * US
 
 
 def test_and_goes_away_from_it_again() -> None:

@@ -26,6 +26,7 @@ PIECE = 40  # bytes of the dictionary in one answer
 NO_ANSWER: WallNs = 5 * SECOND  # at the start, while nothing comes
 RUNS = (1 << 30, 8, 2, 1, 1)  # of steps, at most: a batch that has gone stale is made anew, and shorter
 DYING: WallNs = 700 * MS  # what a host before us has queued is over by then
+RESTARTING: WallNs = 1 * SECOND  # behind a reset: where the connection is still there, it does not go with the board
 
 
 class State(Enum):
@@ -74,6 +75,7 @@ class Board:
         self._known = False  # it was ready once, so that positions mean something
         self._heard_at: WallNs = 0  # something of it, or it was started
         self._wait_until: WallNs | None = None
+        self._restarted_at: WallNs | None = None  # it was told to start again, and is spoken to anew then
         self._identity = bytearray()
         self._setting: Iterator[frozenset[str]] | None = None  # its configuration, as far as it has yet to be sent
         self._pins_set: frozenset[str] = frozenset()  # what the last command of it was about
@@ -130,7 +132,7 @@ class Board:
         self.state = State.CONNECTING
         self._identity.clear()
         self._heard_at = wall
-        self._wait_until = self._setting = None
+        self._wait_until = self._setting = self._restarted_at = None
         self._probes.clear()
         self.wants_reopening = False
         core.link.sync(wall)
@@ -167,7 +169,7 @@ class Board:
         """When `due` wants to be called."""
         if self.state in _STILL:
             return None
-        times = [self.core.link.deadline(), self.core.deadline(), self._wait_until, self._probes.at]
+        times = [self.core.link.deadline(), self.core.deadline(), self._wait_until, self._probes.at, self._restarted_at]
         if self.state is State.CONNECTING:
             times.append(self._heard_at + NO_ANSWER)
         if self.state is State.READY:
@@ -179,6 +181,9 @@ class Board:
         if self.state in _STILL:
             return
         core = self.core
+        if self._restarted_at is not None and wall >= self._restarted_at:  # at a UART a reset leaves the port as it is
+            self.start(wall)
+            return
         core.link.due(wall)
         if self.state is State.CONNECTING and wall >= self._heard_at + NO_ANSWER:
             self._refuse("", "", "it does not answer as a board with Klipper firmware; look at its address and its "
@@ -317,7 +322,7 @@ class Board:
             self._fresh_if_waiting(wall)
             return
         if is_config or is_shutdown:
-            self._start_again(bool(is_shutdown))
+            self._start_again(bool(is_shutdown), wall)
             return
         self._fresh = True
         self._setting = self._equipment.configure()
@@ -338,8 +343,8 @@ class Board:
             self._wait_until = None
             self._read_all(wall)
 
-    def _start_again(self, is_shutdown: bool) -> None:
-        """It has another configuration: it has to start again, and its connection goes away."""
+    def _start_again(self, is_shutdown: bool, wall: WallNs) -> None:
+        """It has another configuration: it has to start again, and its connection goes away, if that is by USB."""
         core = self.core
         if "reset" in core.dictionary.commands:
             core.command("reset")
@@ -349,7 +354,7 @@ class Board:
             what = "it has another configuration and cannot be reset by command; switch it off and on"
             self._refuse("", "", what, passing=True)
             return
-        self.wants_reopening = True
+        self.wants_reopening, self._restarted_at = True, wall + RESTARTING
 
     def _read_all(self, wall: WallNs) -> None:
         """The level of every input, and the count of every stepper; then it is ready."""
@@ -382,7 +387,7 @@ class Board:
         self.reason = ""
         for out in self.outputs.values():
             self._begin_out(out, wall)
-        if self._recovering and self._known:
+        if self._known:
             lost = self._fresh
             shafts = {name: None if lost else axis.counted() for name, axis in self.steppers.items()}
             self.core.events.append(Recovered(self.name, shafts, dict(self.inputs)))
@@ -434,7 +439,7 @@ class Board:
         if self.state in (State.LOST, State.REFUSED, State.IDLE):
             return
         if self.wants_reopening:
-            self.state = State.LOST  # as it was told
+            self.state, self._restarted_at = State.LOST, None  # as it was told
             return
         self._fall(State.LOST)
         self.reason = reason
@@ -449,8 +454,9 @@ class Board:
     def _fall(self, state: State) -> None:
         self.state = state
         self.core.forget_questions()
-        self._recovering = False
-        self._wait_until = self._setting = None
+        self._probes.break_off()
+        self._recovering = self.wants_reopening = False  # whoever stopped it has to say that it may come back
+        self._wait_until = self._setting = self._restarted_at = None
         self._equipment.fall(shut_down=state is State.SHUT_DOWN)
         self.core.queue.clear(self.core.queue.size)
 

@@ -3,7 +3,7 @@
 The first board is the master. Cell time is its time: a nominal second is so many of its own ticks, so that trains need
 no scaling. Other boards get their ticks by regression: of their clocks on the wall clock, and of that on the master.
 Their line is drawn anew every second: at rest where it should be, in motion from the tick at which it stands, to meet
-the estimate two seconds later, so that no pulse jumps.
+the estimate two seconds later, so that no pulse jumps; later still where the clocks have parted, as a host slept.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,6 +26,7 @@ REOPEN_EVERY: WallNs = 250 * MS
 REDRAW_EVERY: Ns = SECOND
 MEETING: Ns = 2 * SECOND
 AT_ONCE: WallNs = 1 * MS  # between two commits at least, where a change of an output is due
+CATCHING_UP = 100  # by a hundredth of its speed at most: two clocks may have parted, and motors keep to their speed
 FINER = 5  # bits of the fraction of a tick in the slope of another board
 
 
@@ -149,13 +150,18 @@ class Boards:
             return clock.tick_at(self.wall_of(cell + self.lead))
 
         begin = at(now) if tick is None else tick
-        slope = (at(now + MEETING) - begin) << FINER
+        meets, own = at(now + MEETING), at(now + MEETING) - at(now)
+        most = own // CATCHING_UP
+        slope = min(max(meets - begin, own - most), own + most) << FINER
         numerator = slope * SECOND // MEETING
         board.core.scale = Scale(numerator, SECOND << FINER, begin, now)
 
     def _redraw(self, board: Board, now: Ns, wall: WallNs) -> None:
         """The same, from where it is: pulses that have left have theirs, and no later one may come before them."""
-        still = all(stepper.over(wall) for stepper in board.steppers.values())
+        still = all(
+            stepper.over(wall) or (stepper.stands(wall) is not None and not board.stops[name].alive)
+            for name, stepper in board.steppers.items()
+        )  # one that was told to move, and of which nothing has been sent, stands
         self._draw(board, now, None if still else board.core.scale.tick(now))
 
     # -- work

@@ -59,8 +59,13 @@ class Clock:
         return self._rate * SECOND
 
     def extend(self, low: int, wall: WallNs) -> int:
-        """The whole count whose low 32 bits are `low` and which is nearest to the estimate at `wall`."""
-        return nearest(low, self.tick_at(wall))
+        """What a board says its clock is at, around `wall`, as a whole count; 32 bits of it came.
+
+        The nearest to the estimate, but never before what the board said last: an estimate may be off by more than half
+        of the 32 bits (4 s at 520 MHz), and a clock that went back would have the cell stand until it is there again.
+        """
+        tick = nearest(low, self.tick_at(wall))
+        return max(tick, self.reached + (tick - self.reached) % WRAP)
 
     def note(self, tick: int, sent: WallNs, received: WallNs) -> bool:
         """A round trip; `tick` is a whole count. False: it does not fit, and is put aside until the next does not."""

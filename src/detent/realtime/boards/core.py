@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from detent.outputs.steps import Scale
-from detent.realtime.boards.clock import Clock, nearest
+from detent.realtime.boards.clock import Clock
 from detent.realtime.boards.dictionary import BARE, Dictionary, Message, Value
 from detent.realtime.boards.events import Event
 from detent.realtime.boards.link import Link
@@ -16,6 +16,7 @@ from detent.ticks import MS, SECOND, Ns
 
 MASK = 0xFFFFFFFF
 ASK_AGAIN: WallNs = 40 * MS  # an answer that was lost on the way is asked for again
+AHEAD: Ns = 1000 * MS  # nothing is said for later, however late its unit is: 32 bits are no more than 4 s at 520 MHz
 UNSURE: Ns = 1 * MS  # how far the clock's estimate may be off, generously
 
 
@@ -101,13 +102,13 @@ class Core:
         """The first tick for which something may still be sent at `wall`."""
         return self.clock.tick_at(wall) + self.ticks(self.setup.margin)
 
+    def reach(self, wall: WallNs) -> int:
+        """The last tick for which something may be sent at `wall` already."""
+        return self.clock.tick_at(wall) + self.ticks(AHEAD)
+
     def after_lead(self, wall: WallNs) -> int:
         """The tick a lead from now, for what has no time of its own: a host that is kept away is not late with it."""
         return self.clock.tick_at(wall) + self.ticks(self.setup.lead)
-
-    def whole(self, message: Message, field: str, wall: WallNs) -> int:
-        """A clock in a message, of which 32 bits came, as a whole count."""
-        return nearest(message.number(field), self.clock.tick_at(wall))
 
     def comes(self, tick: int) -> None:
         """What is said now is for that tick, and has to be there before."""

@@ -131,8 +131,9 @@ class DigitalOut:
         That is the wall time up to which stops of the board have been heard of (None: there are none). What is late
         already waits for it, as one that took place meanwhile would take it back.
 
-        What is set for cell time `firm` or before cannot be taken back: it is given at once. So is a supply that is
-        switched on, as the steps behind it may not come before it, however long the computer is elsewhere.
+        What is set for cell time `firm` or before cannot be taken back: it is given at once, as far as the firmware
+        takes it. So is a supply that is switched on, as the steps behind it may not come before it, however long the
+        computer is elsewhere.
         """
         if not self.wants(wall):
             return False
@@ -142,6 +143,7 @@ class DigitalOut:
             self._correct(self._back, soonest, wall)
         if self._back is not None:
             return False  # what is set next comes behind it
+        reach = self._reach(wall)
         horizon = soonest + core.ticks(max(HOLD - core.setup.margin, core.setup.margin))
         known = None if heard is None else core.clock.tick_at(heard)
         waits = False
@@ -149,7 +151,10 @@ class DigitalOut:
             self._pending
             and not (self.of is not None and self.of.waits)
             and (self._switches_on() or not (self.of is not None and self.of.has_yet_to_step(self._pending[0].at)))
-            and (self._pending[0].tick <= horizon or self._pending[0].at <= firm or self._switches_on())
+            and (
+                self._pending[0].tick <= horizon
+                or ((self._pending[0].at <= firm or self._switches_on()) and self._pending[0].tick <= reach)
+            )
         ):
             if known is not None and known < self._pending[0].tick < soonest and not self._switches_on():
                 waits = True
@@ -164,6 +169,15 @@ class DigitalOut:
         if self._hungry(wall):
             self._feed(wall)
         return waits
+
+    def _reach(self, wall: WallNs) -> int:
+        """The last tick for which a change may be given: the firmware takes none beyond the end of its watchdog."""
+        core, setup = self._core, self.setup
+        reach = core.reach(wall)
+        if setup.watchdog is None or self.level is setup.off:
+            return reach
+        fed = max(self._last_tick, core.clock.tick_at(self._fed_at or 0))
+        return min(reach, fed + core.ticks(setup.watchdog - core.setup.margin))
 
     def _switches_on(self) -> bool:
         """Whether the next change gives a power stage its supply."""

@@ -36,6 +36,10 @@ class Probes:
         self._then, self._left = then, FIRST
         self.ask(wall)
 
+    def break_off(self) -> None:
+        """Nobody waits any more until the clock is known; it is asked for from time to time as before."""
+        self._left = 0
+
     def _uptime(self, message: Message, wall: WallNs) -> None:
         whole = (message.number("high") & 0xFFFFFFFF) << 32 | message.number("clock") & 0xFFFFFFFF
         self._core.clock.note(whole, wall, wall)
@@ -55,7 +59,7 @@ class Probes:
 
     def _clocked(self, message: Message, wall: WallNs) -> None:
         core = self._core
-        tick = core.whole(message, "clock", wall)
+        tick = core.clock.extend(message.number("clock"), wall)
         if not core.clock.note(tick, self._sent, wall):
             self.ask(wall)  # the next one says which of them was wrong
         elif self._left:

@@ -355,10 +355,11 @@ class Stepper:
         """Send every pulse with a time up to `now`, as far as the move queue has room; `settle` has been called.
 
         Before each run it gives the tick at which that is due, and sends it when it is asked for the next one: so
-        whoever has several axes sends what is due first. It may be left off at any time.
+        whoever has several axes sends what is due first. It may be left off at any time. What is due far ahead, as the
+        unit is that late, waits.
         """
         core = self._core
-        present = core.clock.tick_at(wall)
+        present, reach = core.clock.tick_at(wall), core.reach(wall)
         while self._spans:
             span = self._spans[0]
             upto = span.train.steps_by(now)
@@ -369,6 +370,8 @@ class Stepper:
             while span.next <= upto:
                 due = self._ready(span).due()
                 assert due is not None
+                if due > reach:
+                    return
                 yield due
                 if core.queue.room(present - core.ticks(UNSURE)) <= SPARE:
                     return

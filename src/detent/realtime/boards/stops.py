@@ -15,7 +15,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from detent.realtime.boards.core import MASK, UNSURE, Core
+from detent.realtime.boards.clock import nearest
+from detent.realtime.boards.core import AHEAD, MASK, UNSURE, Core
 from detent.realtime.boards.dictionary import Message, Value
 from detent.realtime.boards.events import Stopped
 from detent.realtime.boards.setup import InputSetup
@@ -25,7 +26,7 @@ from detent.ticks import MS, NEVER, Ns
 
 BY_THE_HOST = 255  # reasons that no input has
 DRY = 254
-FAR: Ns = 1000 * MS  # ahead at most of the tick at which it fires by itself
+FAR: Ns = AHEAD  # at most, of the tick at which it fires by itself
 REPORT: Ns = 25 * MS  # of a trigger that is alive
 
 
@@ -163,10 +164,10 @@ class Stop:
         self._core.command("trsync_trigger", oid=self.oid, reason=BY_THE_HOST)
 
     def commit(self, wall: WallNs) -> None:
-        """Send what has changed."""
-        changes, self._changes = self._changes, []
-        for inputs, at in changes:
-            self._change(inputs, at, wall)
+        """Send what has changed; what guards pulses that are due far ahead waits, as they do."""
+        reach = self._core.reach(wall)
+        while self._changes and (not self._changes[0][0] or self._axis.tick(self._changes[0][1]) <= reach):
+            self._change(*self._changes.pop(0), wall)
 
     def _change(self, inputs: dict[str, bool], at: Ns, wall: WallNs) -> None:
         core = self._core
@@ -349,6 +350,8 @@ class Stop:
         self._armed.clear()
         waiting = {("stepper_position", oid) for oid in self._axis.oids}
         base = core.scale
+        # it was before the time-out; a computer that was away since knows no better, and 32 bits may have gone round
+        near = self._before[-1].tick if self._before else core.clock.tick_at(wall)
 
         def came(message: Message, at: WallNs) -> None:
             waiting.discard((message.name, message.number("oid")))
@@ -360,7 +363,7 @@ class Stop:
                 self._read(asked.setup.name, present, at)
                 if asked is watched and self._firing is not None:
                     sample = core.ticks(asked.setup.sample)
-                    edge = core.whole(message, "next_clock", at) - sample
+                    edge = nearest(message.number("next_clock"), near) - sample
                     stop = edge + (asked.setup.samples - 1) * sample
                     scale = base.later(self._axis.lag_at(stop))
                     self._firing = self._firing._replace(at=scale.time(stop), edge=scale.time(edge))
