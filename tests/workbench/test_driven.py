@@ -219,8 +219,9 @@ def test_what_waits_on_a_line_when_a_machine_is_stopped_is_not_heard_when_it_goe
         await bench.until(lambda state: state.real is not None and state.real.standing == "fault")
         await bench.recover()
         state = await bench.until(lambda state: state.real is not None and state.real.standing == "driven")
+        seen = await bench.until(lambda later: later.now > state.now + 500 * MS)  # what is seen is a moment late
         stood = position(bench)
-        await bench.until(lambda later: later.now > state.now + 1500 * MS)
+        await bench.until(lambda later: later.now > seen.now + 1500 * MS)
         assert position(bench) - stood <= 1
 
     play(scene, tmp_path, line_timing=True)
