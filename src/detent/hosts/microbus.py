@@ -6,7 +6,8 @@ message when no byte has come for `SILENCE` seconds (docs/controllers/supersigma
 
 - keeps silent for so long before its first message, and behind every question that was not answered;
 - asks before it lets a drive move: whoever answers is in step;
-- says a stop at once, and once more when the drive has answered: then it is heard for certain.
+- says a stop at once, and once more when the drive has answered: then it is heard for certain;
+- takes whatever was broken off for a question that is not answered yet.
 
 Filling the gap with bytes instead would not do: whatever they are, they could be the steps of a movement.
 """
@@ -27,6 +28,9 @@ SILENCE: Final = 0.11  # a drive counts 0.1 s, by a clock of its own
 MORE: Final = 0.02  # seconds that another controller may take for the rest of what it says
 TRIES: Final = 2
 STOPS: Final = 4  # times that a stop is said before it is given up
+NO_COMMAND: Final = 0x78
+"""No op-code, and none that is one with one bit wrong."""
+REFUSAL: Final = 0x10  # the flag of a command that was refused: an accepted movement clears it
 
 
 class Report(NamedTuple):
@@ -58,7 +62,12 @@ class Report(NamedTuple):
     @property
     def refused(self) -> bool:
         """A command was refused."""
-        return bool(self.flags & 0x10)
+        return bool(self.flags & REFUSAL)
+
+    def follows(self, before: "Report") -> bool:
+        """Whether a movement was accepted behind `before`. One that ended just as that one did cannot be told."""
+        flags = (self.flags ^ before.flags) & ~REFUSAL
+        return self.steps != before.steps or bool(flags) or (before.refused and not self.refused)
 
 
 class BusDriver(Driver):
@@ -88,19 +97,18 @@ class BusDriver(Driver):
             more = b"?"  # who is there is not known yet
         for left in reversed(range(TRIES)):
             yield Clear()
+            self._in_step = False
             answer = yield Ask(data, length(ANSWER), self._patience)
             echoed = answer.data[: len(data)] == data
             if echoed and answer.whole:  # steps and a flag that read so, or an echo before the answer
                 echoed = (yield Ask(b"", length(len(data)), self._patience)).whole
             if echoed:
-                self._in_step = False
                 raise BadAnswer(f"drive {drive}", ECHOES, Spoken(data, answer.data))
             if answer.whole and more:
                 more = (yield Ask(b"", length(1), MORE)).data
             if answer.whole and not answer.data[2] & NO_FLAG and not more:
-                self._at = answer.at
-                return Report(int.from_bytes(answer.data[:2], "big"), answer.data[2])
-            self._in_step = False
+                self._at, self._in_step = answer.at, True
+                return _report(answer.data)
             if left:
                 yield from self._silent()
                 more = b"?"
@@ -118,28 +126,66 @@ class BusDriver(Driver):
             raise Busy(f"drive {drive}", "moves", advice="wait() for its end, or stop() it")
         return report
 
+    def _said(self, data: bytes) -> Steps[None]:
+        """Say what is not answered. Broken off, it may be there in part."""
+        self._in_step = False
+        yield Ask(data)
+        self._in_step = True
+
+    def _distinct(self, drive: int, report: Report, steps: int | None) -> Steps[Report]:
+        """A report of a drive at rest that a movement by `steps` (None: origination) will not end with, too.
+
+        If `report` is one, the drive is told what it refuses: that flag is cleared by a movement, if that is accepted.
+        A command is not answered, and one that was damaged on the bus may look obeyed without that.
+        """
+        same = report.originated if steps is None else report.steps == abs(steps)
+        for _ in range(TRIES):
+            if report.refused or not same:
+                return report
+            yield from self._said(message(drive, NO_COMMAND))
+            report = yield from self._status(drive)
+        if not report.refused:
+            raise BadAnswer(f"drive {drive}", f"does not tell that it refuses {NO_COMMAND:02X}h, which is no op-code")
+        return report
+
     def _stopped(self, drive: int, code: int) -> Steps[None]:
         """Tell a drive to stop, at once; and again, once it is known to be in step. Raises NoAnswer.
 
-        A stop that is said twice stops once.
+        A stop that is said twice stops once. One that was damaged may be a command that moves a drive at rest: it is
+        asked whether that has happened.
         """
         data = message(drive, code)
+        if not self._in_step:
+            yield Ask(data)
+            yield from self._silent()
         for left in reversed(range(STOPS)):
+            self._in_step = False
             yield Ask(data)
             yield Clear()
             # at first not long: what did not hear it moves on
             answer = yield Ask(message(drive, STATUS), length(ANSWER), self._patience / 2**left)
             if answer.whole and not answer.data[2] & NO_FLAG:
-                self._in_step = True
-                yield Ask(data)
-                return
-            self._in_step = False
-            if left:
+                yield from self._said(data)
+                if _report(answer.data).moving:
+                    return
+                self._in_step = False
+                more = yield Ask(message(drive, STATUS), length(ANSWER), self._patience / 2 ** (left + 1))
+                self._in_step = more.whole
+                if more.whole and not _report(more.data).moving:
+                    return
+                answer = more
+                if left and not more.whole:
+                    yield from self._silent()
+            elif left:
                 yield from self._silent()
         if answer.data == message(drive, STATUS):
             raise BadAnswer(f"drive {drive}", f"{ECHOES}; it may still move", Spoken(answer.data, answer.data))
         what = f"does not answer: it was told to stop {STOPS} times and may still move"
         raise NoAnswer(f"drive {drive}", what, Spoken(data, answer.data))
+
+
+def _report(data: bytes) -> Report:
+    return Report(int.from_bytes(data[:2], "big"), data[2])
 
 
 def message(drive: int, code: int, steps: int | None = None, speed: int | None = None) -> bytes:

@@ -10,7 +10,7 @@ from math import asin, sqrt
 
 from detent.hosts.axis import POLL, Axis, Limits, Speeds
 from detent.hosts.errors import Busy, DriverError, MotionFailed
-from detent.hosts.exchange import Ask, Asynchronous, Blocking, Rest, Steps, attempt, operation
+from detent.hosts.exchange import Asynchronous, Blocking, Rest, Steps, attempt, operation
 from detent.hosts.interpolation import CLOCK_HZ, EXCHANGE, MESSAGE, UNIT, Run, line, together
 from detent.hosts.microbus import (
     CONSTANT,
@@ -60,6 +60,8 @@ class Supersigma(Axis, BusDriver):
         self._from = 0  # where the movement that is accounted for began, or the drive stands
         self._direction = 0  # of that movement; 0: there is none
         self._last = 0  # direction of the last movement
+        self._before = Report(0, 0)  # what was reported before the movement that is accounted for
+        self._taken = False  # that movement was seen
         self._originating = False
         self._wanted: int | None = None  # steps of the movement under way, as long as nobody stops it
 
@@ -69,10 +71,17 @@ class Supersigma(Axis, BusDriver):
     def status(self) -> Steps[Report]:
         """Steps of the last movement or of the one under way, and flags. Raises NoAnswer."""
         report = yield from self._status(self.drive)
-        if self._direction and not report.moving:
-            if not report.refused:  # then the steps are those of the movement before
-                self._from = self._place(report)
-            self._direction = 0
+        if self._direction:
+            self._taken = self._taken or report.moving
+            for _ in range(AWAITED):  # nothing but the same answer tells a damaged one from a sound one
+                if report.moving:
+                    break
+                before, report = report, (yield from self._status(self.drive))
+                if report == before:
+                    if self._taken or report.follows(self._before):  # else it was never heard
+                        self._from = self._place(report)
+                    self._direction = 0
+                    break
         return report
 
     @operation
@@ -96,8 +105,7 @@ class Supersigma(Axis, BusDriver):
     @operation
     def originate(self) -> Steps[None]:
         """Begin the search for the origin, backward to the end of the rail. It is position 0. Raises Busy."""
-        yield from self._begin(message(self.drive, ORIGINATE), -1)
-        self._originating, self._wanted = True, None
+        yield from self._begin(message(self.drive, ORIGINATE), None)
 
     @operation
     def emergency(self) -> Steps[None]:
@@ -105,13 +113,19 @@ class Supersigma(Axis, BusDriver):
         self._wanted = None
         yield from self._stopped(self.drive, EMERGENCY)
 
-    def _begin(self, data: bytes, steps: int) -> Steps[None]:
-        """A drive refuses to begin while it moves, and tells only when it is asked: it is asked first."""
-        if (yield from self.status()).moving:
+    def _begin(self, data: bytes, steps: int | None) -> Steps[None]:
+        """Begin a movement by `steps`, None for origination.
+
+        A drive refuses to begin while it moves, and tells only when it is asked: it is asked first.
+        """
+        report = yield from self.status()
+        if report.moving:
             raise self._busy()
-        yield Ask(data)
-        self._direction = self._last = 1 if steps > 0 else -1
-        self._originating, self._wanted = False, abs(steps)
+        self._before, self._taken = (yield from self._distinct(self.drive, report, steps)), False
+        # accounted for before it is said: whoever is broken off then may have said it
+        self._direction = self._last = 1 if steps is not None and steps > 0 else -1
+        self._originating, self._wanted = steps is None, None if steps is None else abs(steps)
+        yield from self._said(data)
 
     def _busy(self) -> Busy:
         return Busy(self.title, "moves", advice="wait() for its end, or stop() it")
@@ -263,7 +277,7 @@ class Ccu(BusDriver):
     def _begin(self, drive: int, data: bytes) -> Steps[None]:
         """Whoever is to move is asked first: it is at rest and in step with us then."""
         yield from self._ready(drive)
-        yield Ask(data)
+        yield from self._said(data)
 
     # -- several drives ----------------------------------------------------------------------------------
 
@@ -293,7 +307,7 @@ class Ccu(BusDriver):
     @operation
     def originate_all(self, drives: Iterable[int]) -> Steps[dict[int, Report]]:
         """Find the origins of several drives at once, and wait until all are found."""
-        reports = yield from self._all(dict.fromkeys(drives, 1), lambda drive: message(drive, ORIGINATE))
+        reports = yield from self._all(dict.fromkeys(drives), lambda drive: message(drive, ORIGINATE))
         for drive, report in reports.items():
             if not report.originated:
                 raise DriveFailed(drive, "found no origin", report)
@@ -319,11 +333,11 @@ class Ccu(BusDriver):
         for drive in drives:
             message(drive, CONSTANT, steps[drive], speed)
         for drive in drives:
-            yield from self._ready(drive)
+            yield from self._distinct(drive, (yield from self._ready(drive)), steps[drive])
         limit = together([steps[drive] for drive in drives], fastest) * UNIT
         try:
             if limit > LOW:
-                yield Ask(b"".join(message(drive, LIMIT, steps[drive], limit) for drive in drives))
+                yield from self._said(b"".join(message(drive, LIMIT, steps[drive], limit) for drive in drives))
                 self._made((yield from self.wait_for(*drives)), steps)
             else:
                 yield from self._follow(drives, line([steps[drive] for drive in drives], fastest))
@@ -338,13 +352,13 @@ class Ccu(BusDriver):
         first = sum(run.at == place * MESSAGE for place, run in enumerate(runs[: len(drives)]))
         began = self._at + MESSAGE / CLOCK_HZ
         # one write, so that the drives start one message apart, as the line is reckoned
-        yield Ask(b"".join(commands[:first]))
+        yield from self._said(b"".join(commands[:first]))
         self._at += first * MESSAGE / CLOCK_HZ
         made = {run.axis: abs(run.steps) for run in runs[:first]}
         for run, command in zip(runs[first:], commands[first:], strict=True):
             yield Rest(max(began + (run.at - EXCHANGE) / CLOCK_HZ - self._at, 0.0))
             yield from self._ended(drives[run.axis], made[run.axis])
-            yield Ask(command)
+            yield from self._said(command)
             made[run.axis] = abs(run.steps)
             _check(drives[runs[0].axis], (yield from self._status(drives[runs[0].axis])))
         yield Rest(max(began + max((run.end for run in runs), default=0) / CLOCK_HZ - self._at, 0.0))
@@ -361,13 +375,14 @@ class Ccu(BusDriver):
                 return
         raise DriveFailed(drive, "still moves: its clock is not that of the other drives", report)
 
-    def _all(self, steps: Mapping[int, int], start: Callable[[int], bytes]) -> Steps[dict[int, Report]]:
-        drives = [drive for drive, count in steps.items() if count]
+    def _all(self, steps: Mapping[int, int | None], start: Callable[[int], bytes]) -> Steps[dict[int, Report]]:
+        """Start all drives that have steps, or none named: originations; wait for all."""
+        drives = [drive for drive, count in steps.items() if count != 0]
         data = [start(drive) for drive in drives]
         for drive in drives:
-            yield from self._ready(drive)
+            yield from self._distinct(drive, (yield from self._ready(drive)), steps[drive])
         for one in data:
-            yield Ask(one)
+            yield from self._said(one)
         return (yield from self.wait_for(*drives))
 
     def _made(self, reports: Mapping[int, Report], steps: Mapping[int, int]) -> dict[int, Report]:
