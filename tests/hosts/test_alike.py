@@ -230,7 +230,7 @@ def test_every_call_on_a_line_that_babbles_ends_in_time_with_a_short_error(model
 NAMED = {f"dcb-274 {mode}": lambda port, mode=mode: BlockingDcb274(Dcb274("A", mode=mode), port)
          for mode in ("party", "daisy", "sin10")}  # fmt: skip
 STOPPED_BY = {
-    "gs-c200": (rb"Z|K", 5), "gs-c200s": (rb"Z|K", 5), "supersigma": (rb"\x01[\x06\x07]", 1.5),
+    "gs-c200": (rb"Z|K", 5.5), "gs-c200s": (rb"Z|K", 5.5), "supersigma": (rb"\x01[\x06\x07]", 1.5),
     "dcb-274": (rb"@|\x1b", 6), "bs0610": (rb"XZ", 4), "dcb-274 party": (rb"A[@|]", 1.5),
     "dcb-274 daisy": (rb"A[@|]\n", 2), "dcb-274 sin10": (rb"A[@|]\r", 1.5),
 }  # fmt: skip

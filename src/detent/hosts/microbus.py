@@ -7,11 +7,13 @@ message when no byte has come for `SILENCE` seconds (docs/controllers/supersigma
 - keeps silent for so long before its first message, and behind every question that was not answered;
 - asks before it lets a drive move: whoever answers is in step;
 - says a stop at once, and once more when the drive has answered: then it is heard for certain;
-- asks in the same breath as it lets a drive move, where status would read the same if the drive had not heard it.
+- has a drive refuse something before it lets it move, where status would read the same if the drive had not heard that;
+- takes whatever was broken off for a question that is not answered yet.
 
 Filling the gap with bytes instead would not do: whatever they are, they could be the steps of a movement.
 """
 
+from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 from detent.hosts.errors import ECHOES, BadAnswer, Busy, NoAnswer, Spoken
@@ -28,6 +30,9 @@ SILENCE: Final = 0.11  # a drive counts 0.1 s, by a clock of its own
 MORE: Final = 0.02  # seconds that another controller may take for the rest of what it says
 TRIES: Final = 2
 STOPS: Final = 4  # times that a stop is said before it is given up
+NO_COMMAND: Final = 0x78
+"""No op-code, and none that is one with one bit wrong."""
+REFUSAL: Final = 0x10  # the flag of a command that was refused: an accepted movement clears it
 
 
 class Report(NamedTuple):
@@ -59,7 +64,12 @@ class Report(NamedTuple):
     @property
     def refused(self) -> bool:
         """A command was refused."""
-        return bool(self.flags & 0x10)
+        return bool(self.flags & REFUSAL)
+
+    def follows(self, before: "Report") -> bool:
+        """Whether a movement was accepted behind `before`. One that ended just as that one did cannot be told."""
+        flags = (self.flags ^ before.flags) & ~REFUSAL
+        return self.steps != before.steps or bool(flags) or (before.refused and not self.refused)
 
 
 class BusDriver(Driver):
@@ -68,6 +78,7 @@ class BusDriver(Driver):
     _patience = PATIENCE
     _in_step = False  # nobody but us has spoken on the bus, as far as is known
     _at = 0.0  # when the last status was answered, in seconds by the clock of the port
+    _refusing: frozenset[int] = frozenset()  # drives that were made to refuse, and were told no movement since
 
     def forget(self) -> None:
         """The connection was lost: another may have spoken, and half a message may be waiting."""
@@ -78,46 +89,29 @@ class BusDriver(Driver):
         yield Pause(SILENCE)
         self._in_step = True
 
-    def _start(self, drive: int, data: bytes, before: Report) -> Steps[Report | None]:
-        """Tell a drive that is at rest, with the status `before`, to make the movement `data`.
-
-        A movement of as many steps as the one before, and a search behind one that has found the origin, end with the
-        status that there is already. Then the drive is asked as well, in the same write: its answer begins 0.1 ms after
-        the movement, which is under way then. Returned is that answer; None where the end of the movement tells.
-        """
-        searches = data[1] == ORIGINATE
-        if before.originated if searches else before.steps == int.from_bytes(data[2:4], "big"):
-            report = yield from self._status(drive, data)
-            # an answer has no checksum: that it does not move is asked for twice
-            return report if report.moving else (yield from self._status(drive))
-        yield Ask(data)
-        return None
-
-    def _status(self, drive: int, first: bytes = b"") -> Steps[Report]:
+    def _status(self, drive: int) -> Steps[Report]:
         """Status of a drive, asked again behind a silence if it is not answered. Raises NoAnswer, BadAnswer.
 
-        A late answer to an earlier question is not taken for it. `first` is said before the question, once.
+        A late answer to an earlier question is not taken for it.
         """
-        data, more = first + message(drive, STATUS), b""
+        data, more = message(drive, STATUS), b""
         if not self._in_step:
             yield from self._silent()
             more = b"?"  # who is there is not known yet
         for left in reversed(range(TRIES)):
             yield Clear()
+            self._in_step = False
             answer = yield Ask(data, length(ANSWER), self._patience)
             echoed = answer.data[: len(data)] == data
             if echoed and answer.whole:  # steps and a flag that read so, or an echo before the answer
                 echoed = (yield Ask(b"", length(len(data)), self._patience)).whole
             if echoed:
-                self._in_step = False
                 raise BadAnswer(f"drive {drive}", ECHOES, Spoken(data, answer.data))
             if answer.whole and more:
                 more = (yield Ask(b"", length(1), MORE)).data
             if answer.whole and not answer.data[2] & NO_FLAG and not more:
-                self._at = answer.at
-                return Report(int.from_bytes(answer.data[:2], "big"), answer.data[2])
-            self._in_step = False
-            data = message(drive, STATUS)
+                self._at, self._in_step = answer.at, True
+                return _report(answer.data)
             if left:
                 yield from self._silent()
                 more = b"?"
@@ -135,28 +129,76 @@ class BusDriver(Driver):
             raise Busy(f"drive {drive}", "moves", advice="wait() for its end, or stop() it")
         return report
 
+    def _said(self, data: bytes) -> Steps[None]:
+        """Say what is not answered. Broken off, it may be there in part."""
+        self._in_step = False
+        yield Ask(data)
+        self._in_step = True
+
+    def _moved(self, data: bytes, drives: Iterable[int]) -> Steps[None]:
+        """Say `data`, movements of `drives`: the flag of a refusal tells from then on that one was not made."""
+        self._refusing -= frozenset(drives)
+        yield from self._said(data)
+
+    def _blamed(self, drive: int, report: Report) -> Report:
+        """`report` without the refusal that a call which was broken off has asked a drive for."""
+        return report._replace(flags=report.flags & ~REFUSAL) if drive in self._refusing else report
+
+    def _distinct(self, drive: int, report: Report, steps: int | None) -> Steps[Report]:
+        """A report of a drive at rest that a movement by `steps` (None: origination) will not end with, too.
+
+        If `report` is one, the drive is told what it refuses: that flag is cleared by a movement, if that is accepted.
+        A command is not answered, and one that was damaged on the bus may look obeyed without that.
+        """
+        same = report.originated if steps is None else report.steps == abs(steps)
+        for _ in range(TRIES):
+            if report.refused or not same:
+                return report
+            self._refusing |= {drive}
+            yield from self._said(message(drive, NO_COMMAND))
+            report = yield from self._status(drive)
+        if not report.refused:
+            raise BadAnswer(f"drive {drive}", f"does not tell that it refuses {NO_COMMAND:02X}h, which is no op-code")
+        return report
+
     def _stopped(self, drive: int, code: int) -> Steps[None]:
         """Tell a drive to stop, at once; and again, once it is known to be in step. Raises NoAnswer.
 
-        A stop that is said twice stops once.
+        A stop that is said twice stops once. One that was damaged may be a command that moves a drive at rest: it is
+        asked whether that has happened.
         """
         data = message(drive, code)
+        if not self._in_step:
+            yield Ask(data)
+            yield from self._silent()
         for left in reversed(range(STOPS)):
+            self._in_step = False
             yield Ask(data)
             yield Clear()
             # at first not long: what did not hear it moves on
             answer = yield Ask(message(drive, STATUS), length(ANSWER), self._patience / 2**left)
             if answer.whole and not answer.data[2] & NO_FLAG:
-                self._in_step = True
-                yield Ask(data)
-                return
-            self._in_step = False
-            if left:
+                yield from self._said(data)
+                if _report(answer.data).moving:
+                    return
+                self._in_step = False
+                more = yield Ask(message(drive, STATUS), length(ANSWER), self._patience / 2 ** (left + 1))
+                self._in_step = more.whole
+                if more.whole and not _report(more.data).moving:
+                    return
+                answer = more
+                if left and not more.whole:
+                    yield from self._silent()
+            elif left:
                 yield from self._silent()
         if answer.data == message(drive, STATUS):
             raise BadAnswer(f"drive {drive}", f"{ECHOES}; it may still move", Spoken(answer.data, answer.data))
         what = f"does not answer: it was told to stop {STOPS} times and may still move"
         raise NoAnswer(f"drive {drive}", what, Spoken(data, answer.data))
+
+
+def _report(data: bytes) -> Report:
+    return Report(int.from_bytes(data[:2], "big"), data[2])
 
 
 def message(drive: int, code: int, steps: int | None = None, speed: int | None = None) -> bytes:

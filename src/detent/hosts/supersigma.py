@@ -10,7 +10,7 @@ from math import asin, sqrt
 
 from detent.hosts.axis import POLL, Axis, Limits, Speeds
 from detent.hosts.errors import Busy, DriverError, MotionFailed
-from detent.hosts.exchange import Ask, Asynchronous, Blocking, Rest, Steps, attempt, operation
+from detent.hosts.exchange import Asynchronous, Blocking, Rest, Steps, attempt, operation
 from detent.hosts.interpolation import CLOCK_HZ, EXCHANGE, MESSAGE, UNIT, Run, line, together
 from detent.hosts.microbus import (
     CONSTANT,
@@ -29,7 +29,6 @@ from detent.hosts.microbus import (
 )
 
 # The curve of the paper, V = 15000 sin^2(4.54426 t + 0.2097) half steps/s: where ramps begin, and where they end.
-AGAIN = 3  # times that a status is asked for until it is told twice
 AWAITED = 50  # times that a drive is asked whether a movement has ended that should have
 LOW, TOP, _RATE, _PHASE = 650, 15_000, 4.54426, 0.2097
 
@@ -47,8 +46,7 @@ class Supersigma(Axis, BusDriver):
 
     A drive does not count positions. The driver does, from the steps that status reports of each movement, and knows
     of no other movements: if somebody else moves the drive, a second host or a `Ccu` on the same port, the position
-    is wrong until the next `home` or `set_position`. What begins a movement raises DriveFailed as well where nothing
-    else would tell that the drive has not heard it.
+    is wrong until the next `home` or `set_position`.
     """
 
     fastest = TOP
@@ -61,9 +59,9 @@ class Supersigma(Axis, BusDriver):
         self._limit: int | None = None  # of moves with ramps, half steps/s
         self._from = 0  # where the movement that is accounted for began, or the drive stands
         self._direction = 0  # of that movement; 0: there is none
-        self._before = Report(0, 0)  # status before it was begun
-        self._heard = False  # the drive is known to have begun it
         self._last = 0  # direction of the last movement
+        self._before = Report(0, 0)  # what was reported before the movement that is accounted for
+        self._taken = False  # that movement was seen
         self._originating = False
         self._wanted: int | None = None  # steps of the movement under way, as long as nobody stops it
 
@@ -73,27 +71,17 @@ class Supersigma(Axis, BusDriver):
     def status(self) -> Steps[Report]:
         """Steps of the last movement or of the one under way, and flags. Raises NoAnswer."""
         report = yield from self._status(self.drive)
-        if not self._direction:
-            return report
-        if not report.moving and report.steps != self._wanted:
-            report = yield from self._confirmed(report)
-        # not so by the flag of a refusal: a question that was damaged sets it, too
-        before = self._before
-        other = report.steps != before.steps or report.originated != before.originated
-        self._heard = self._heard or report.moving or other
-        if not report.moving:
-            if self._heard:  # else the steps are those of the movement before
-                self._from = self._place(report)
-            self._direction = 0
-        return report
-
-    def _confirmed(self, report: Report) -> Steps[Report]:
-        """What status says twice: an answer has no checksum, and what is damaged would stay in the position."""
-        for _ in range(AGAIN):
-            again = yield from self._status(self.drive)
-            if again == report:
-                break
-            report = again
+        if self._direction:
+            self._taken = self._taken or report.moving
+            for _ in range(AWAITED):  # nothing but the same answer tells a damaged one from a sound one
+                if report.moving:
+                    break
+                before, report = report, (yield from self._status(self.drive))
+                if report == before:
+                    if self._taken or report.follows(self._before):  # else it was never heard
+                        self._from = self._place(report)
+                    self._direction = 0
+                    break
         return report
 
     @operation
@@ -117,7 +105,7 @@ class Supersigma(Axis, BusDriver):
     @operation
     def originate(self) -> Steps[None]:
         """Begin the search for the origin, backward to the end of the rail. It is position 0. Raises Busy."""
-        yield from self._begin(message(self.drive, ORIGINATE), -1)
+        yield from self._begin(message(self.drive, ORIGINATE), None)
 
     @operation
     def emergency(self) -> Steps[None]:
@@ -125,20 +113,19 @@ class Supersigma(Axis, BusDriver):
         self._wanted = None
         yield from self._stopped(self.drive, EMERGENCY)
 
-    def _begin(self, data: bytes, steps: int) -> Steps[None]:
-        """A drive refuses to begin while it moves, and tells only when it is asked: it is asked first."""
-        before = yield from self.status()
-        if before.moving:
+    def _begin(self, data: bytes, steps: int | None) -> Steps[None]:
+        """Begin a movement by `steps`, None for origination.
+
+        A drive refuses to begin while it moves, and tells only when it is asked: it is asked first.
+        """
+        report = yield from self.status()
+        if report.moving:
             raise self._busy()
-        self._before, self._heard = before, False
-        self._direction = self._last = 1 if steps > 0 else -1
-        self._originating, self._wanted = data[1] == ORIGINATE, None
-        told = yield from self._start(self.drive, data, before)
-        if told is not None and not told.moving:
-            self._direction = 0
-        self._heard = _begun(self.drive, told)
-        if not self._originating:
-            self._wanted = abs(steps)
+        self._before, self._taken = (yield from self._distinct(self.drive, report, steps)), False
+        # accounted for before it is said: whoever is broken off then may have said it
+        self._direction = self._last = 1 if steps is not None and steps > 0 else -1
+        self._originating, self._wanted = steps is None, None if steps is None else abs(steps)
+        yield from self._moved(data, [self.drive])
 
     def _busy(self) -> Busy:
         return Busy(self.title, "moves", advice="wait() for its end, or stop() it")
@@ -241,16 +228,13 @@ class Supersigma(Axis, BusDriver):
         report = yield from self.status()
         originating, self._originating = self._originating, False
         wanted, self._wanted = self._wanted, None
-        _check(self.drive, report, wanted)
+        _check(self.drive, self._blamed(self.drive, report), wanted)
         if originating and not report.originated:
             raise DriveFailed(self.drive, "found no origin", report)
 
 
 class Ccu(BusDriver):
-    """The drives of one MICROBUS together: each call names the drive or the drives. It keeps no positions.
-
-    What begins a movement raises DriveFailed as well where nothing else would tell that a drive has not heard it.
-    """
+    """The drives of one MICROBUS together: each call names the drive or the drives. It keeps no positions."""
 
     title = "CCU"
 
@@ -263,17 +247,17 @@ class Ccu(BusDriver):
     @operation
     def move(self, drive: int, steps: int, *, limit: int | None = None) -> Steps[None]:
         """Begin a movement with ramps, at no more than `limit` half steps/s if that is given. Raises Busy."""
-        yield from self._begin(drive, _move(drive, steps, limit))
+        yield from self._begin(drive, _move(drive, steps, limit), steps)
 
     @operation
     def move_constant(self, drive: int, steps: int, speed: int) -> Steps[None]:
         """Begin a movement at `speed` half steps/s without ramps. Raises Busy."""
-        yield from self._begin(drive, message(drive, CONSTANT, steps, speed))
+        yield from self._begin(drive, message(drive, CONSTANT, steps, speed), steps)
 
     @operation
     def originate(self, drive: int) -> Steps[None]:
         """Begin the search for the origin. Raises Busy."""
-        yield from self._begin(drive, message(drive, ORIGINATE))
+        yield from self._begin(drive, message(drive, ORIGINATE), None)
 
     @operation
     def stop(self, drive: int) -> Steps[None]:
@@ -290,10 +274,13 @@ class Ccu(BusDriver):
         """Ask a drive. Raises NoAnswer."""
         return (yield from self._status(drive))
 
-    def _begin(self, drive: int, data: bytes) -> Steps[None]:
-        """Whoever is to move is asked first: it is at rest and in step with us then."""
-        before = yield from self._ready(drive)
-        _begun(drive, (yield from self._start(drive, data, before)))
+    def _begin(self, drive: int, data: bytes, steps: int | None) -> Steps[None]:
+        """Begin a movement by `steps`, None for origination.
+
+        Whoever is to move is asked first: it is at rest and in step with us then.
+        """
+        yield from self._distinct(drive, (yield from self._ready(drive)), steps)
+        yield from self._moved(data, [drive])
 
     # -- several drives ----------------------------------------------------------------------------------
 
@@ -307,7 +294,7 @@ class Ccu(BusDriver):
         waiting = list(drives)
         while waiting:
             for drive in tuple(waiting):
-                report = reports[drive] = yield from self.status(drive)
+                report = reports[drive] = self._blamed(drive, (yield from self.status(drive)))
                 _check(drive, report)
                 if not report.moving:
                     waiting.remove(drive)
@@ -323,7 +310,7 @@ class Ccu(BusDriver):
     @operation
     def originate_all(self, drives: Iterable[int]) -> Steps[dict[int, Report]]:
         """Find the origins of several drives at once, and wait until all are found."""
-        reports = yield from self._all(dict.fromkeys(drives, 1), lambda drive: message(drive, ORIGINATE))
+        reports = yield from self._all(dict.fromkeys(drives), lambda drive: message(drive, ORIGINATE))
         for drive, report in reports.items():
             if not report.originated:
                 raise DriveFailed(drive, "found no origin", report)
@@ -348,38 +335,37 @@ class Ccu(BusDriver):
         drives = [drive for drive, count in steps.items() if count]
         for drive in drives:
             message(drive, CONSTANT, steps[drive], speed)
-        before = {}
-        for drive in drives:
-            before[drive] = (yield from self._ready(drive)).steps
         limit = together([steps[drive] for drive in drives], fastest) * UNIT
+        runs = [] if limit > LOW else line([steps[drive] for drive in drives], fastest)
+        begins = {drive: steps[drive] for drive in drives} | {drives[run.axis]: run.steps for run in reversed(runs)}
+        for drive in drives:
+            yield from self._distinct(drive, (yield from self._ready(drive)), begins[drive])
         try:
             if limit > LOW:
-                began = self._at
-                yield Ask(b"".join(message(drive, LIMIT, steps[drive], limit) for drive in drives))
-                for drive in drives:
-                    if before[drive] == abs(steps[drive]):
-                        yield from self._seen(drive, began + before[drive] / limit)
+                data = b"".join(message(drive, LIMIT, steps[drive], limit) for drive in drives)
+                yield from self._moved(data, drives)
                 self._made((yield from self.wait_for(*drives)), steps)
             else:
-                yield from self._follow(drives, line([steps[drive] for drive in drives], fastest), before)
+                yield from self._follow(drives, runs)
         except DriverError:
             for drive in drives:
                 yield from attempt(self._stopped(drive, STOP))
             raise
 
-    def _follow(self, drives: Sequence[int], runs: Sequence[Run], before: Mapping[int, int]) -> Steps[None]:
+    def _follow(self, drives: Sequence[int], runs: Sequence[Run]) -> Steps[None]:
         """Send each movement of a line at its time, when the one before of its drive has ended; wait for the last.
 
-        One of as many steps as the one `before` is looked at on its way, where the bus has time for a question.
+        One of as many steps as the one before it in the line, where the bus has no time for a refusal, is looked at on
+        its way, if it has time for a question.
         """
         commands = [message(drives[run.axis], CONSTANT, run.steps, run.speed * UNIT) for run in runs]
         first = sum(run.at == place * MESSAGE for place, run in enumerate(runs[: len(drives)]))
         began = self._at + MESSAGE / CLOCK_HZ
         # one write, so that the drives start one message apart, as the line is reckoned
-        yield Ask(b"".join(commands[:first]))
+        yield from self._moved(b"".join(commands[:first]), drives)
         self._at += first * MESSAGE / CLOCK_HZ
         made = {run.axis: abs(run.steps) for run in runs[:first]}
-        unsure = [run for run in runs[:first] if before[drives[run.axis]] == abs(run.steps)]
+        unsure: list[Run] = []
         for run, command in zip(runs[first:], commands[first:], strict=True):
             ask_at = began + (run.at - EXCHANGE) / CLOCK_HZ
             while unsure and self._at + MESSAGE / CLOCK_HZ <= ask_at:
@@ -387,7 +373,7 @@ class Ccu(BusDriver):
                 yield from self._seen(drives[other.axis], began + other.end / CLOCK_HZ)
             yield Rest(max(ask_at - self._at, 0.0))
             yield from self._ended(drives[run.axis], made[run.axis])
-            yield Ask(command)
+            yield from self._said(command)
             if made[run.axis] == abs(run.steps):
                 unsure.append(run)
             made[run.axis] = abs(run.steps)
@@ -402,8 +388,8 @@ class Ccu(BusDriver):
         """See that a drive moves whose movement lasts until `end` at least. Raises DriveFailed."""
         report = yield from self._status(drive)
         _check(drive, report)
-        if self._at < end:
-            _begun(drive, report)
+        if not report.moving and self._at < end:
+            raise DriveFailed(drive, "was not seen to move: a message was lost on the bus", report)
 
     def _ended(self, drive: int, steps: int) -> Steps[None]:
         """See that the movement of a drive has ended, which it should have by now. Raises DriveFailed."""
@@ -415,14 +401,14 @@ class Ccu(BusDriver):
                 return
         raise DriveFailed(drive, "still moves: its clock is not that of the other drives", report)
 
-    def _all(self, steps: Mapping[int, int], start: Callable[[int], bytes]) -> Steps[dict[int, Report]]:
-        drives = [drive for drive, count in steps.items() if count]
+    def _all(self, steps: Mapping[int, int | None], start: Callable[[int], bytes]) -> Steps[dict[int, Report]]:
+        """Start all drives that have steps, or none named: originations; wait for all."""
+        drives = [drive for drive, count in steps.items() if count != 0]
         data = [start(drive) for drive in drives]
-        before = {}
         for drive in drives:
-            before[drive] = yield from self._ready(drive)
+            yield from self._distinct(drive, (yield from self._ready(drive)), steps[drive])
         for drive, one in zip(drives, data, strict=True):
-            _begun(drive, (yield from self._start(drive, one, before[drive])))
+            yield from self._moved(one, [drive])
         return (yield from self.wait_for(*drives))
 
     def _made(self, reports: Mapping[int, Report], steps: Mapping[int, int]) -> dict[int, Report]:
@@ -439,16 +425,6 @@ def _move(drive: int, steps: int, limit: int | None) -> bytes:
     return message(drive, CONSTANT if limit < LOW else LIMIT, steps, limit)
 
 
-def _begun(drive: int, report: Report | None) -> bool:
-    """Whether `report`, asked for with the movement, is there and shows it. Raises DriveFailed where it shows none."""
-    if report is None:
-        return False
-    if not report.moving:
-        what = "was not seen to move: a message was lost on the bus; if it did move: originate()"
-        raise DriveFailed(drive, "refused a command" if report.refused else what, report)
-    return True
-
-
 def _check(drive: int, report: Report, steps: int | None = None) -> None:
     """Raise DriveFailed for an emergency or a refused command, and for other `steps` made than were told."""
     if report.end_of_rail:
@@ -456,7 +432,7 @@ def _check(drive: int, report: Report, steps: int | None = None) -> None:
     if report.excessive_force:
         raise DriveFailed(drive, f"met excessive force after {report.steps} steps", report)
     if report.refused:
-        raise DriveFailed(drive, "refused a command", report)
+        raise DriveFailed(drive, "refused a command, or has not heard it", report)
     if steps is not None and report.steps != steps:
         why = "a message was lost or damaged on the bus"
         if not report.steps:

@@ -45,7 +45,8 @@ class MotorRecord:
         self._speeds = SpeedFields(self._fields, motor, self._one)
         self._count = 0  # of the motions that were ever wanted
         self._wanted = 0  # the number of the one that is; 0: none
-        self._stop = False  # the motion under way is to end
+        self._ending = asyncio.Event()  # the motion under way is to end
+        self._stood = 0  # how many motions were seen to end
         self._why = ""  # and its put fails for this
         self._bound: float | None = None  # the dial position that the motion under way may reach; None: it searches
         self._puts: dict[str, Callable[[float], Awaitable[None]]] = {
@@ -62,6 +63,14 @@ class MotorRecord:
             "SSET": lambda on: self._fields.set(SET=1), "SUSE": lambda on: self._fields.set(SET=0),
             **{name: partial(self._speeds.put, name) for name in SPEEDS},
         }  # fmt: skip
+
+    @property
+    def _stop(self) -> bool:
+        return self._ending.is_set()
+
+    @_stop.setter
+    def _stop(self, on: bool) -> None:
+        (self._ending.set if on else self._ending.clear)()
 
     @property
     def fields(self) -> Mapping[str, Value]:
@@ -240,13 +249,34 @@ class MotorRecord:
             await self._fields.set(**{field: 0})
 
     async def _put_stop(self, on: float) -> None:
-        """End the motion under way, if there is one."""
-        if on and self._one.locked():
+        """End the motion under way, whoever has begun it. Raises PutFailed."""
+        if on:
+            stood = self._stood
             self._wanted = 0  # those that wait for their turn give up, too
             self._stop = True
-            async with self._one:
-                pass
-        await self._fields.set(STOP=0)
+            try:
+                async with self._one:
+                    if self._stood == stood:
+                        await self._end_what_others_began()
+            finally:
+                await self._fields.set(STOP=0)
+        else:
+            await self._fields.set(STOP=0)
+
+    async def _end_what_others_began(self) -> None:
+        """Stop the motor, whether it moves or not: another host may move it, or a call that seemed to have failed."""
+        try:
+            await self._motor.stop()
+            with contextlib.suppress(MotionFailed):
+                while await self._motor.moving():
+                    await self._motor.port.wait(POLL)
+        except (DriverError, OSError) as error:
+            await self._fields.lose(error)
+            raise PutFailed(str(error)) from error
+        before = self._fields.raw
+        await self.look()
+        if self._fields.raw != before:
+            await self._fields.follow_place()
 
     async def _put_go(self, value: float) -> None:
         before, now = self._fields["SPMG"], Go(int(value))
@@ -291,13 +321,39 @@ class MotorRecord:
             await self._fields.show_status()
             problem: Exception | None = None
             try:
-                await self._speeds.tune()
-                if target is None or target != await self._motor.position():
-                    await start()
+                if await self._begun(start, target):
                     await self._follow()
             except (DriverError, OSError, ValueError) as error:
                 problem = error
             await self._end(doing, target, problem, mine)
+
+    async def _begun(self, start: Callable[[], Awaitable[None]], target: int | None) -> bool:
+        """Begin a motion; whether the motor may move. A stop breaks this off.
+
+        A unit may let a move wait for one that another host has begun, which may never end.
+        """
+
+        async def begins() -> bool:
+            await self._speeds.tune()
+            if target is not None and target == await self._motor.position() and not await self._motor.moving():
+                return False
+            await start()
+            return True
+
+        beginning, ending = asyncio.ensure_future(begins()), asyncio.ensure_future(self._ending.wait())
+        try:
+            await asyncio.wait({beginning, ending}, return_when=asyncio.FIRST_COMPLETED)
+            if beginning.done():
+                return beginning.result()
+            beginning.cancel()
+            await asyncio.wait({beginning})
+            if not beginning.cancelled() and (error := beginning.exception()) is not None:
+                raise error
+            await self._motor.stop()
+            return True
+        finally:
+            beginning.cancel()
+            ending.cancel()
 
     async def _follow(self) -> None:
         """Show where the motor is until it stands. Raises MotionFailed if it stands elsewhere than it should."""
@@ -314,6 +370,7 @@ class MotorRecord:
             else:
                 await self._fields.show_place()
             await motor.port.wait(POLL)
+        self._stood += 1
         try:
             await motor.wait()
         except MotionFailed:

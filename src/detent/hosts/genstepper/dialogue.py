@@ -57,26 +57,30 @@ class Dialogue(Axis):
         self._timeout = patience + LONGEST * LINE_BITS / baud
         self._stale = True  # something may have come, or may still come, that nobody asked for
         self._met = False  # it has answered: if it signs on now, what was agreed on with it is gone
+        self._due = ""  # commands that give back what a call that was broken off may have left changed
 
     def forget(self) -> None:
         """The connection was lost, or the board was reset: what comes first may be old."""
-        self._stale, self._met = True, False
+        self._stale, self._met, self._due = True, False, ""
 
     def ask(  # type: ignore[override]  # a question in commands, where the base has bytes
-        self, commands: str, number: int, *, again: bool = True
+        self, commands: str, number: int, *, again: bool = True, leaves: str = ""
     ) -> Steps[tuple[int, ...]]:
-        """Say `commands` to the motor, then ask for report `number`; its values, eleven for report 0.
+        """Say `commands` to the motor, behind what is due, then ask for report `number`; its values, eleven for 0.
 
-        `again`: all of it may be said again if the answer does not come whole. Raises NoAnswer, BadAnswer.
+        `again`: all of it may be said again if the answer does not come whole. `leaves` is due from then on, even if
+        this is broken off. Raises NoAnswer, BadAnswer.
         """
-        values = 11 if number == 0 else 1
-        wanted = re.compile(rb"%b,%d((?:,-?\d+){%d})(?:\r\n)?\*" % (self.motor.encode(), number, values))
-        found = yield from self.exchange(f"{self.motor}{commands}{number}?", wanted, again=again)
+        values = rb"(?:,-?\d+){11}" if number == 0 else rb",[0-8]" if number == ACTION else rb",-?\d+"
+        wanted = re.compile(rb"%b,%d(%b)(?:\r\n)?\*" % (self.motor.encode(), number, values))
+        due, self._due = self._due, leaves or self._due
+        found = yield from self.exchange(f"{self.motor}{due}{commands}{number}?", wanted, again=again)
+        self._due = leaves
         return tuple(int(value) for value in found[1].split(b",")[1:])
 
-    def order(self, commands: str, *, again: bool = True) -> Steps[Action]:
+    def order(self, commands: str, *, again: bool = True, leaves: str = "") -> Steps[Action]:
         """Say `commands` to the motor; returned is what it does then."""
-        (action,) = yield from self.ask(commands, ACTION, again=again)
+        (action,) = yield from self.ask(commands, ACTION, again=again, leaves=leaves)
         return Action(action)
 
     def at_once(self, commands: str) -> Steps[None]:

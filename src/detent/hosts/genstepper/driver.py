@@ -1,6 +1,6 @@
 """The driver of one motor of a BS0610 or BS0710: the common face over GenStepper's commands, and its settings."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import ClassVar, Final
 
 from detent.hosts.axis import Limits, Speeds
@@ -24,6 +24,9 @@ from detent.hosts.genstepper.dialogue import MOTORS, TRIES, Action
 
 GOING: Final = (Action.RAMPING_UP, Action.RUNNING, Action.SLOWING, Action.STOPPING_TO_GO)
 """Report -8 of a motor that goes to a target."""
+
+ENDING: Final = (Action.IDLE, Action.STOPPING, Action.FINISHED)
+"""Report -8 of a motor that was told to stop."""
 
 NO_RAMP: Final = RATES[-1]  # a stop rate at which everything may stop at once (page 29)
 
@@ -88,9 +91,7 @@ class GenStepper(Commands):
         self._begin()
         if self._slew is None:
             self._slew = yield from self.report(RUN_RATE)
-        self._run = None
-        yield from self.set_run_rate(whole)
-        self._run = whole
+        yield from self._set_run(whole)
         yield from self.slew(1 if rate > 0 else -1)
 
     @operation
@@ -98,7 +99,7 @@ class GenStepper(Commands):
         """Z: ramp down to the stop rate and stand. Nothing happens if the motor stands already."""
         self._begin()
         yield from self.at_once("Z")
-        yield from self.order("Z")
+        yield from self._stopped("Z", ENDING)
 
     @operation
     def halt(self) -> Steps[None]:
@@ -113,12 +114,30 @@ class GenStepper(Commands):
             (keep,) = yield from self.ask("Z", STOP_RATE)
         self._keep = None
         try:
-            yield from self.order(f"Z{NO_RAMP}K")
-            yield from self.set_stop_rate(keep)
+            yield from self._stopped(f"Z{NO_RAMP}K", (Action.IDLE,), leaves=f"{keep}K")
+            yield from self._kept(keep)
+        except MotionFailed:
+            yield from self._kept(keep)
+            raise
         except DriverError as error:
             what = f"{error.what}; it was being halted, and its stop rate may be {NO_RAMP}: set_stop_rate({keep})"
             raise DriverError(self.title, what, error.spoken) from error
+
+    def _kept(self, keep: int) -> Steps[None]:
+        """K is given back, as it is due."""
+        (told,) = yield from self.ask("", STOP_RATE)
+        self._check("K", keep, told)
         self._keep = keep
+
+    def _stopped(self, commands: str, ended: Collection[Action], leaves: str = "") -> Steps[None]:
+        """Say `commands` until the board says that the motor has `ended`; `leaves` is due behind them.
+
+        A Z that was damaged on its way is answered like one that was not.
+        """
+        for _ in range(TRIES):
+            if (yield from self.order(commands, leaves=leaves)) in ended:
+                return
+        raise MotionFailed(self.title, "moves on, though it was told to stop: is one of its slew inputs held?")
 
     @operation
     def home(self, direction: int = -1) -> Steps[None]:
@@ -168,6 +187,7 @@ class GenStepper(Commands):
         slope = RATES[-1]
         if rise < slope * speeds.seconds:
             slope = max(round(rise / speeds.seconds), RATES[0])
+        self._keep = self._slew = self._run = None
         told = Reports(*(yield from self.ask(f"{keep}K{run}R{slope}P", 0)))
         wrong = (told.stop_rate, told.run_rate) != (keep, run)
         if wrong or (told.action == Action.IDLE and told.slope != slope):
@@ -192,8 +212,25 @@ class GenStepper(Commands):
     def _at_slew(self) -> Steps[None]:
         """Have moves made at the rate that they had, after a run at another."""
         if self._slew is not None and self._run != self._slew:
-            yield from self.set_run_rate(self._slew)
-            self._run = self._slew
+            yield from self._set_run(self._slew)
+
+    def _set_run(self, rate: int) -> Steps[None]:
+        self._run = None
+        yield from Commands.set_run_rate(self, rate)
+        self._run = rate
+
+    @operation
+    def set_run_rate(self, rate: int) -> Steps[None]:
+        """R: the rate of moves and slews, 1 to 62500 microsteps/s; a slew follows at once."""
+        yield from self._set_run(rate)
+        self._slew = rate
+
+    @operation
+    def set_stop_rate(self, rate: int) -> Steps[None]:
+        """K: the rate at which motion may start and stop, 1 to 62500 microsteps/s."""
+        self._keep = None
+        yield from super().set_stop_rate(rate)
+        self._keep = rate
 
     # -- settings ----------------------------------------------------------------------------------------
 

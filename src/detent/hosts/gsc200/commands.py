@@ -48,15 +48,13 @@ class Commands(Dialogue):
         tenths = round(seconds * 10)
         if tenths not in language.TENTHS or abs(seconds * 10 - tenths) > 1e-6:
             raise ValueError(f"a delay is 0.1 to 25.5 s, in tenths of a second, not {seconds:g} s")
-        self.begins()
-        yield from self.delayed(f"D{tenths}", Again.NEVER)
+        yield from self.delayed(f"D{tenths}", Again.NEVER, begins=True)
 
     @operation
     def wait_for(self, input: int) -> Steps[None]:
         """W: be busy until user input 1 to 3 is one."""
         command = f"W{_in(language.PINS, input, 'an input')}"
-        self.begins()
-        yield from self.delayed(command, Again.WHEN_READY)
+        yield from self.delayed(command, Again.WHEN_READY, begins=True)
 
     @operation
     def pins(self) -> Steps[UserPins]:
@@ -87,16 +85,14 @@ class Commands(Dialogue):
     def go_to(self, position: int) -> Steps[None]:
         """G: begin a move to a position, 0 to 9999999 (GS-C200), -8388608 to +8388607 (GS-C200S)."""
         command = f"G{self._position(position)}"
-        self.begins()
-        yield from self.delayed(command, Again.WHEN_READY)
+        yield from self.delayed(command, Again.WHEN_READY, begins=True)
 
     @operation
     def move(self, steps: int) -> Steps[None]:
         """+ or -: begin a move by 1 to 999999 steps, with their sign."""
         if abs(steps) not in language.MOVES:
             raise ValueError(f"a move has 1 to {language.MOVES[-1]} steps, not {steps}: move_to() goes further")
-        self.begins()
-        yield from self.delayed(f"{steps:+d}", Again.NEVER)
+        yield from self.delayed(f"{steps:+d}", Again.NEVER, begins=True)
 
     @operation
     def go(self, direction: int, until_low: int | None = None) -> Steps[None]:
@@ -106,8 +102,7 @@ class Commands(Dialogue):
         """
         stop = "" if until_low is None else str(_in(language.PINS, until_low, "an input"))
         command = ("g" if self.signed else "G") + _sign(direction) + stop
-        self.begins()
-        yield from self.delayed(command, Again.NEVER)
+        yield from self.delayed(command, Again.NEVER, begins=True)
 
     @operation
     def find_home(self, direction: int = 1) -> Steps[None]:
@@ -117,25 +112,30 @@ class Commands(Dialogue):
         """
         command = f"H{_sign(direction)}"
         self.begins()
-        yield from self.order(command, Again.NEVER)
-        self._homing, self._cut = True, False
+        before = self._homing, self._cut
+        self._homing = True  # whoever breaks this off has begun it all the same
+        try:
+            yield from self.order(command, Again.NEVER)
+        except Refused:
+            self._homing, self._cut = before
+            raise
+        self._cut = False
 
     @operation
     def zero_speed(self) -> Steps[None]:
         """Z: ramp down, and end the program."""
-        yield from self.order("Z", Again.AT_ONCE)
-        self._cut_off()
+        yield from self._cut_off("Z")
 
     @operation
     def kill(self) -> Steps[None]:
         """K: stop the pulses at once, and end the program."""
-        yield from self.order("K", Again.AT_ONCE)
-        self._cut_off()
+        yield from self._cut_off("K")
 
-    def _cut_off(self) -> None:
-        """A stop ends a homing, wherever that has come to."""
+    def _cut_off(self, command: str) -> Steps[None]:
+        """A stop ends a homing, wherever that has come to; one that is broken off may have done so, too."""
         self.otherwise()
         self._cut = self._cut or (self._homing and not self.signed)
+        yield from self.order(command, Again.AT_ONCE)
         self._homing = False
 
     # -- the position counter ----------------------------------------------------------------------------
@@ -247,6 +247,7 @@ class Commands(Dialogue):
                 lines.append(text)
                 text = yield from self._next_listed()
             if text == "END":
+                self._stale = False
                 return [self._listed(one) for one in lines]
             yield from self._quiet(LISTED_LINES)
         raise BadAnswer(self.title, f"its list of the program was damaged {TRIES} times")

@@ -32,8 +32,23 @@ LISTED = 128  # lines of the longest list of a program, and more
 
 MODES: Final = {"P": True, "Po": True, "P0": True, "Px": False, "E": False}
 """The commands that enter and leave programming mode."""
+STOPS: Final = ("Z", "K")
+COMMANDED: Final = ("Z", "K", "H", "X")
+"""Commands that a module in programming mode answers with E4."""
+MISTAKEN: Final = ("+", "-", "F")
+"""Behind half a frame a move may be another command (``G`` and ``+100``), and F may be answered by what it can answer.
+
+Any other command is refused there (E2, E4), as all are by a checksum.
+"""
+HARMLESS: Final = "V2"  # it changes nothing, in any mode
+
+LEAVING: Final = (
+    "it is in programming mode, which a GS-C200 leaves only by E (execute() in Python), and that starts the program; "
+    "or switch it off and on"
+)
 
 ORDERED = re.compile(r"Y|B|E[1-6]")
+LISTS = re.compile(r"(?!B$|E[1-6]$|END$).*")  # a line of a list, behind which more come
 STATE = re.compile(r"R|B|E[1-6]")
 
 
@@ -86,8 +101,10 @@ class Dialogue(Axis):
         self._character = LINE_BITS / baud
         self.programming = False
         """Whether this driver has put the module into programming mode, where commands are stored."""
-        self._stale = True  # something may have come that nobody asked for
-        self._unended = False  # the last frame may have lost its end: then it is the beginning of the next
+        self._stale = True  # something may have come, or may still come, that nobody asked for
+        self._unread: tuple[float, int] | None = None  # a question whose answer nobody has waited for: seconds, lines
+        self._unended = True  # the line may hold half a frame, of this driver or another: the beginning of the next
+        self._known = False  # the mode is known: it is as `programming` says
         self._spoken: Spoken | None = None  # the last exchange that was understood
         self._begun = False  # this driver has begun what an error that the module keeps would be of, or has seen it
         self._clean = False  # the module is known to keep no error
@@ -101,7 +118,8 @@ class Dialogue(Axis):
     def forget(self) -> None:
         """The connection was lost: what comes first may be old, and the module may have been switched off."""
         self._stale = self._unended = True
-        self.programming = self._begun = self._clean = False
+        self._unread = None
+        self.programming = self._known = self._begun = self._clean = False
         self._owed = ""
 
     # -- exchanges ---------------------------------------------------------------------------------------
@@ -113,11 +131,22 @@ class Dialogue(Axis):
         """
         data = self.frames.frame(command)
         timeout = self.patience + more + self._character * (len(data) + LONGEST)
+        stops = command in STOPS
+        twice = self._stale and stops  # and two answers may come
         if self._stale:
             yield Clear()
+            if stops:
+                yield Ask(data)
+            yield from self._passed()
         self._stale = True
+        if command in MODES:
+            self._known = False
+        if self._unended and command[0] in MISTAKEN and not self.frames.checksums:
+            self._unended = not (yield Ask(self.frames.frame(HARMLESS), self.frames.end, timeout)).whole
         for left in reversed(range(TRIES)):
+            self._unread = (timeout, LISTED if command == "Q" else 2)
             answer = yield Ask(data, self.frames.end, timeout)
+            self._unread = None
             text = self.frames.text(answer.data) if answer.whole else None
             self._silent = self._silent or not answer.data
             if answer.data == data:  # no answer reads as a question does
@@ -126,10 +155,12 @@ class Dialogue(Axis):
                 raise BadAnswer(self.title, ECHOES, Spoken(data, answer.data))
             unheard = text == "E1" or (self._unended and text in ("E2", "E4") and left > 0)
             if text is not None and not unheard and wanted.fullmatch(text):
-                self._stale = self._unended = False
+                self._stale = twice or (command == "Q" and LISTS.fullmatch(text) is not None)
+                self._unended = False
                 self._spoken = Spoken(data, answer.data)
                 if text == "Y" and command in MODES:
                     self.programming = MODES[command]
+                self._known = self._known or text == "B" or (text == "Y" and command[0] in (*COMMANDED, *MODES))
                 return text
             self._unended = not unheard
             rest = b"" if unheard else (yield from self._quiet(LISTED if command == "Q" else 2))
@@ -144,9 +175,30 @@ class Dialogue(Axis):
         """Say a command that is answered Y. Raises Busy, Refused with the datasheet's words."""
         self.judge(command, (yield from self.say(command, ORDERED, again, more)))
 
-    def delayed(self, command: str, again: Again) -> Steps[None]:
-        """Say a command of the delayed execution type; while programming it is stored, and then never said twice."""
+    def delayed(self, command: str, again: Again, *, begins: bool = False) -> Steps[None]:
+        """Say a command of the delayed execution type; while programming it is stored, and then never said twice.
+
+        One that `begins` something takes its time. Raises Busy where the module was left in programming mode and would
+        store it.
+        """
+        if not self._known:
+            yield from self._commands(command)
+        if begins:
+            self.begins()
         yield from self.order(command, Again.NEVER if self.programming else again)
+
+    def _commands(self, command: str) -> Steps[None]:
+        """See that the module would obey `command`, and not store it: K does nothing at rest, or is refused (E4).
+
+        Whatever else is answered in programming mode is answered alike in command mode, or stored.
+        """
+        if not self._clean and (yield from self._asked()).busy:
+            self.judge(command, "B")
+        refusal = yield from self.say("K", ORDERED, Again.AT_ONCE)
+        if refusal == "E4":
+            way = "leave_programming() first" if self.signed else LEAVING
+            raise Busy(self.title, f"would store {command} and not obey, as it was left in programming mode: {way}")
+        self.judge("K", refusal)
 
     def setting(self, command: str) -> Steps[None]:
         """A delayed command that is over in a moment: it is obeyed when this returns. Raises Busy."""
@@ -208,6 +260,14 @@ class Dialogue(Axis):
             yield from self.feedback()
 
     # -- what goes wrong ---------------------------------------------------------------------------------
+
+    def _passed(self) -> Steps[None]:
+        """Let pass by what was said before, so that it is not taken for the answer to what is said now."""
+        seconds, lines = self._unread or (0.0, 2)
+        if self._unread is not None:  # a call was broken off, and its answer is due
+            yield Ask(b"", self.frames.end, seconds)
+            self._unread = None
+        yield from self._quiet(lines)
 
     def _settled(self) -> Steps[bool]:
         """Wait until it is ready, a moment at most. Whether it is."""

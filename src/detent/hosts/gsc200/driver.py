@@ -11,12 +11,7 @@ from detent.hosts.errors import BadAnswer, Busy, DriverError, MotionFailed, NoAn
 from detent.hosts.exchange import Asynchronous, Blocking, Progress, Steps, attempt, operation
 from detent.hosts.gsc200 import language
 from detent.hosts.gsc200.commands import Commands
-from detent.hosts.gsc200.dialogue import TRIES, Again
-
-LEAVING = (
-    "it is in programming mode, which a GS-C200 leaves only by E (execute() in Python), and that starts the program; "
-    "or switch it off and on"
-)
+from detent.hosts.gsc200.dialogue import LEAVING, TRIES, Again, Feedback
 
 
 class GsC200(Commands):
@@ -183,6 +178,31 @@ class GsC200(Commands):
             if error.code != "E4" or (yield from self._asked()).busy:
                 raise
 
+    @operation
+    def set_top(self, rate: int) -> Steps[None]:
+        """T: the slew speed, 10 to 10000 steps/s in tens; that of moves, too, from now on."""
+        if self.programming:
+            yield from super().set_top(rate)
+            return
+        self._top = 0
+        yield from super().set_top(rate)
+        self._slew = self._top = rate // 10
+
+    @operation
+    def execute(self) -> Steps[None]:
+        """E: start the program in RAM at its first instruction; it ends programming mode, too. It may set T."""
+        self._top = 0
+        yield from super().execute()
+
+    @operation
+    def feedback(self) -> Steps[Feedback]:
+        """F: whether it is busy; an error that ended a program is told once, whoever started that."""
+        begun = self._begun
+        told = yield from super().feedback()
+        if told.busy and not begun:
+            self._top = 0  # a program of somebody else may set T
+        return told
+
     def _above(self, position: int) -> Steps[None]:
         """Raise Refused where a homing that was cut off has taken the counter below 0."""
         if not self._cut:
@@ -204,7 +224,7 @@ class GsC200(Commands):
 
     def _set_top(self, tens: int) -> Steps[None]:
         self._top = 0
-        yield from self.set_top(10 * tens)
+        yield from Commands.set_top(self, 10 * tens)
         self._top = tens
 
     def _at_slew(self) -> Steps[None]:
