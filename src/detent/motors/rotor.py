@@ -68,14 +68,13 @@ class Rig(Shared):
         A rotor that is too fast to be held leaves within a swing; one that swings slowly is still about its place after
         `SETTLE`, whatever becomes of it.
         """
-        return max(SETTLE, ceil(SWINGS * self._swing * SECOND))
+        # a current so small that nothing is held by it has no swing to wait for
+        return max(SETTLE, ceil(SWINGS * self._swing(max(self.drive.current, self.motor.current / 10)) * SECOND))
 
-    @property
-    def _swing(self) -> float:
-        """Seconds of a small swing about a place with one phase on."""
+    def _swing(self, current: float) -> float:
+        """Seconds of a small swing about a place with one phase on at so many amperes."""
         motor = self.motor
-        stiffness = motor.teeth * motor.torque_constant * self.drive.current
-        return 2 * pi * sqrt((motor.rotor + self.load.inertia) / stiffness)
+        return 2 * pi * sqrt((motor.rotor + self.load.inertia) / (motor.teeth * motor.torque_constant * current))
 
     def __post_init__(self) -> None:
         motor, drive, load = self.motor, self.drive, self.load
@@ -91,10 +90,11 @@ class Rig(Shared):
                 f"motor {motor.name}: L / R of {motor.real_inductance / resistance:.2g} s, or the inertia of "
                 f"{inertia:.2g} kg m2, is too small to be a motor's: check the units (H, kg m2)"
             )
-        if self._swing > MOST_SWING:
+        swing = self._swing(motor.current)
+        if swing > MOST_SWING:
             raise MotorError(
                 f"an inertia of {inertia:.3g} kg m2 is too large for {motor.name}, on which it swings once in "
-                f"{self._swing:.3g} s: check the unit (1 g cm2 is 1e-7 kg m2), or give a gear"
+                f"{swing:.3g} s: check the unit (1 g cm2 is 1e-7 kg m2), or give a gear"
             )
         set_ = object.__setattr__
         if self.damping is None:
