@@ -8,6 +8,7 @@ from itertools import product
 from typing import Any
 
 import pytest
+from tests.hosts.breaking_off import broken_off
 
 from detent.cell.build import build
 from detent.cell.cell import Cell
@@ -15,7 +16,7 @@ from detent.cell.description import parse
 from detent.cell.host import HostPort
 from detent.hosts.dcb274 import BlockingDcb274, Dcb274
 from detent.hosts.errors import DriverError, NoAnswer
-from detent.hosts.exchange import Ask, Steps
+from detent.hosts.exchange import Steps
 from detent.ticks import SECOND
 
 ESC = b"\x1b"
@@ -81,21 +82,6 @@ def begun(moves: str, way: str = "") -> tuple[Cell, Told, Any]:
     unit.connect()
     MOVES[moves](unit)
     return cell, port, unit
-
-
-def broken_off(unit: Any, port: Told, steps: Steps[Any], behind: int, *, said: bool) -> bool:
-    """Carry out so many steps, hand the next one over if it is to be `said`, and break off; whether all were done."""
-    answer = None
-    try:
-        for _ in range(behind):
-            answer = unit._do(next(steps) if answer is None else steps.send(answer))
-        step = next(steps) if answer is None else steps.send(answer)
-    except (StopIteration, DriverError):
-        return True
-    if said and isinstance(step, Ask):
-        port.write(step.data)
-    steps.close()
-    return False
 
 
 def ramps_down(moves: str, does: str, *, said: bool, later: float, way: str = "") -> None:

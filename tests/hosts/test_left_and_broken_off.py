@@ -10,6 +10,7 @@ from itertools import islice
 from typing import Any
 
 import pytest
+from tests.hosts.breaking_off import broken_off
 from tests.hosts.test_alike import DRIVERS
 
 from detent.cell.build import build
@@ -19,7 +20,7 @@ from detent.cell.faults import OnLine
 from detent.cell.host import HostPort
 from detent.hosts.axis import Speeds
 from detent.hosts.errors import DriverError
-from detent.hosts.exchange import Ask, Steps
+from detent.hosts.exchange import Steps
 from detent.hosts.gsc200 import BlockingGsC200, GsC200
 from detent.lines.faults import HOST, UNITS, BitErrors, Delay, LostCharacters
 from detent.ticks import MS
@@ -231,21 +232,6 @@ MOVES: dict[str, Callable[[Any], object]] = {
     "has moved": lambda unit: (unit.move_by(700), unit.wait(60)),
     "homes": lambda unit: unit.home(1) if isinstance(unit, BlockingGsC200) else unit.home() if unit.home else None,
 }
-
-
-def broken_off(unit: Any, port: HostPort, steps: Steps[Any], behind: int, *, said: bool) -> bool:
-    """Carry out so many steps, hand the next one over if it is to be `said`, and break off; whether all were done."""
-    answer = None
-    try:
-        for _ in range(behind):
-            answer = unit._do(next(steps) if answer is None else steps.send(answer))
-        step = next(steps) if answer is None else steps.send(answer)
-    except (StopIteration, DriverError):
-        return True
-    if said and isinstance(step, Ask):
-        port.write(step.data)
-    steps.close()
-    return False
 
 
 def breaks() -> Iterator[Any]:

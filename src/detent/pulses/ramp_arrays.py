@@ -21,6 +21,7 @@ from detent.pulses.segment import Int64Array
 from detent.pulses.settling import FARTHEST, GUARD, Scale, scale_for, settle
 from detent.ticks import FIXED_BITS, HALF_NS, ONE_NS, Fixed, Ns
 
+COMPILED_CHUNK = 1 << 16  # pulses whose times and work stay in the cache; NumPy's calls are worth it for twice as many
 FEW = 8  # pulses for which the exact law is quicker than arrays
 
 FAR = 2.0**36  # ns from the base at which one in 2**12 comes too close: a shorter chunk is quicker
@@ -36,7 +37,7 @@ def fill_ramp(out: Int64Array, first: int, law: Accelerating, start: Fixed) -> N
     squares = (law.divisor * ONE_NS) ** 2  # (P x + Q**2) / squares is the square of the ns from standstill
     gain = law.gain_ns
     dense: Any = import_module("detent.pulses.dense") if goes_to_numba(len(out)) else None
-    size = CHUNK
+    size = most = CHUNK if dense is None else COMPILED_CHUNK
     work = np.empty(min(size, len(out)))
     done = 0
     while done < len(out):
@@ -59,7 +60,7 @@ def fill_ramp(out: Int64Array, first: int, law: Accelerating, start: Fixed) -> N
             return (law.fixed(n + i) + start + HALF_NS) >> FIXED_BITS
 
         block = out[done : done + count]
-        done, size = done + count, min(2 * size, CHUNK)
+        done, size = done + count, min(2 * size, most)
         if count <= FEW:
             block[:] = [exact(i) for i in range(count)]
             continue

@@ -13,7 +13,7 @@ from detent.pulses.accelerating import TINY
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
-CHUNK = 1 << 16  # pulses whose work arrays stay in the cache
+CHUNK = 1 << 17  # pulses, at most
 ROW = 256  # pulses about whose middle a polynomial is taken
 
 _COUNTING = np.arange(CHUNK + 1, dtype=np.float64)

@@ -53,7 +53,6 @@ from detent.ticks import Ns
 from detent.uart import Chars
 from detent.workbench import look, rotors
 from detent.workbench.alarms import Alarms
-from detent.workbench.haste import Haste
 from detent.workbench.marks import Marks
 from detent.workbench.memory import keep
 from detent.workbench.messages import (
@@ -69,6 +68,7 @@ from detent.workbench.messages import (
     State,
 )
 from detent.workbench.pipe import Pipe
+from detent.workbench.timing import Timing
 from detent.workbench.waiting import Waiting, Waits
 
 BY_HAND = "by hand"
@@ -83,7 +83,7 @@ class Engine:
     def __init__(self, end: socket.socket, order: Order) -> None:
         """Build the cell and open its endpoints. Raises Problem, ImagesUnusable, EndpointError, ValueError."""
         self._order = order
-        self._haste = Haste()
+        self._timing = Timing()
         self._quiet = False  # nothing has changed since it was last told
         self.waiting = Waiting(order.queue)
         self.control: str | None = None  # the URL of who looks and meddles
@@ -267,7 +267,7 @@ class Engine:
         self._pipe.push(Answer(message.number, value, error))
 
     def _tick(self, wall: WallNs) -> None:
-        self._haste.look(wall, self.now, self._pace)
+        self._timing.look(wall, self.now, self._pace)
         if not self._pipe.full and not (self._quiet and self._pace.held):
             self._tell()
 
@@ -302,7 +302,7 @@ class Engine:
             pace=None if pace.free else float(pace.factor),
             held=pace.held,
             stopped_why=history.stopped,
-            lateness=self._haste.lateness,
+            lateness=self._timing.lateness,
             units=look.units(history),
             switches=look.switches(history),
             motors=look.motors(history),
@@ -314,7 +314,7 @@ class Engine:
             formats={name: str(line.format) for name, line in lines.items()},
             speaking={name: line.host_busy_until for name, line in lines.items()},
             dropped=sum(endpoint.dropped for _, endpoint in self._opened),
-            faster=self._haste.faster,
+            faster=self._timing.faster,
             real=self._real_state(),
             queue=self.waiting.queue,
             idle=pace.free and not pace.held and history.cell.next_event() is None,

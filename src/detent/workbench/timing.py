@@ -5,7 +5,7 @@ from detent.ticks import SECOND, Ns
 from detent.workbench.messages import Lateness
 
 
-class Haste:
+class Timing:
     """`faster`: its time by real time; `lateness` of its deadlines since the pace was chosen."""
 
     def __init__(self) -> None:
